@@ -1,0 +1,32 @@
+"""Long work as a generator of progress steps.
+
+One generator serves every caller: a script drives it to its end, a modal operator takes one step per timer event and can
+stop between two steps, which cancels the work.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from typing import NamedTuple, TypeVar
+
+
+class Progress(NamedTuple):
+    """Where the work stands: the stage's name (a present participle) and its share done, 0 to 1."""
+
+    stage: str
+    fraction: float
+
+
+Result = TypeVar("Result")
+Steps = Generator[Progress, None, Result]
+
+
+def drive(steps: Steps[Result], report: Callable[[Progress], None] | None = None) -> Result:
+    """Run `steps` to the end, telling `report` of each one, and return its result."""
+    while True:
+        try:
+            progress = next(steps)
+        except StopIteration as end:
+            return end.value
+        if report is not None:
+            report(progress)
