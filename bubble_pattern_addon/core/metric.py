@@ -1,4 +1,4 @@
-"""Scalar fields over the target region: the packing metric M_p and the shaping metric M_s are both made of these.
+"""Scalar fields over the target region: the packing metric M_p and the shaping metric M_s are made of these.
 
 A number is one case of a field (`Constant`); whatever takes a size takes a field.
 """

@@ -1,7 +1,7 @@
 """Long work as a generator of progress steps.
 
-One generator serves every caller: a script drives it to its end, a modal operator takes one step per timer event and can
-stop between two steps, which cancels the work.
+One generator serves every caller: a script drives it to its end, a modal operator takes one step per timer
+event and can stop between two steps, which cancels the work.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ from .metric import Constant, Field
 
 @dataclass(frozen=True)
 class RegionChoice:
-    """Which faces of the base are the target region. Exactly one way is used: near, attribute, material or all."""
+    """Which faces of the base are the target region: exactly one of near, attribute, material and all."""
 
     near: tuple[float, float, float] | None = None
     max_angle: float = 20.0
@@ -49,7 +49,7 @@ class Feature:
 
 @dataclass(frozen=True)
 class Limits:
-    """What must remain: min_web between two features, min_margin between a feature's edge and the region's boundary."""
+    """What must remain: min_web between two features, min_margin from a feature's edge to the boundary."""
 
     min_web: float = 0.0
     min_margin: float = 0.0
