@@ -1,0 +1,295 @@
+"""Figures of a pattern: its order, how even its gaps and its first row are, its webs, margins and open area.
+
+All figures of `Quality` are relative to the local pitch: neither the unit nor the size of the part matters.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from .mesh import Bools, Floats, Ints
+
+if TYPE_CHECKING:
+    from .pattern import Pattern
+    from .region import Region
+
+INTERIOR = 1.25
+"""A bubble farther than this many pitches from the region's boundary is interior: from the second row on."""
+
+REACH = 1.9
+"""Delaunay neighbours farther apart than this many pitches face each other across a void or an island."""
+
+HORIZON = 3.0
+"""Bubbles farther than this many pitches have no say in who the neighbours are."""
+
+SHEET_TURN = -0.3
+"""Normals with a smaller cosine are of different sheets: a box's edge is crossed, a thin wall is not."""
+
+SHEET_STEP = 0.4
+"""Largest share of two bubbles' distance that is along their mean normal: 0 on any arc, 1 when stacked."""
+
+CANDIDATES = (12, 26, 60)
+"""How many of the nearest bubbles are looked at for neighbours, more only where these leave a doubt."""
+
+FLAT_CORNER = 1e-6
+"""Shorter Voronoi edges (in pitches) do not count: four bubbles on one circle are no neighbours crosswise."""
+
+
+@dataclass(frozen=True)
+class Quality:
+    """How good a packing is. A figure with nothing to measure (no interior bubble, no first row) is nan.
+
+    six: share of interior bubbles with exactly six neighbours
+    psi6: mean over interior bubbles of |sum of exp(6 i angle)| / number of neighbours; 1 on a perfect lattice
+    gap_cv: standard deviation / mean of the distance to the nearest bubble relative to the pitch, all bubbles
+    gap_min: smallest of these relative distances
+    rim_cv: standard deviation / mean of the first row's distances to the boundary relative to the pitch
+    """
+
+    six: float
+    psi6: float
+    gap_cv: float
+    gap_min: float
+    rim_cv: float
+
+
+def measure(pattern: Pattern, region: Region) -> Quality:
+    """Quality of a pattern on its target region."""
+    return measure_points(
+        pattern.position, pattern.normal, pattern.pitch, pattern.row, region.boundary_segments
+    )
+
+
+def measure_points(
+    position: Floats, normal: Floats, pitch: Floats, row: Ints, boundary_segments: Floats
+) -> Quality:
+    """Quality of any points, so that other programs' arrangements are measured by the same rule.
+
+    position: (n, 3); normal: (n, 3) unit; pitch: (n,) local centre distance; row: (n,) 0 for the first row
+    along the boundary; boundary_segments: (S, 2, 3), none for a closed surface
+    """
+    n = len(position)
+    to_boundary = boundary_distance(position, boundary_segments) / pitch
+    interior = to_boundary > INTERIOR
+    near = neighbours(position, normal, pitch)
+    count = np.bincount(near.first, minlength=n)
+    star = np.bincount(near.first, np.cos(6 * near.angle), n) + 1j * np.bincount(
+        near.first, np.sin(6 * near.angle), n
+    )
+    order = np.abs(star) / np.maximum(count, 1)
+    gap = np.full(n, np.inf)
+    np.minimum.at(gap, near.first, near.distance / pitch[near.first])
+    gap = gap[np.isfinite(gap)]
+    rim = to_boundary[(row == 0) & np.isfinite(to_boundary)]
+    return Quality(
+        six=_mean(count[interior] == 6),
+        psi6=_mean(order[interior]),
+        gap_cv=_variation(gap),
+        gap_min=float(gap.min()) if len(gap) else np.nan,
+        rim_cv=_variation(rim),
+    )
+
+
+def min_web(pattern: Pattern) -> float:
+    """Least material between features on one sheet, |xi - xj| - (di + dj) / 2; inf when none are neighbours."""
+    near = neighbours(pattern.position, pattern.normal, pattern.pitch)
+    if not len(near.first):
+        return np.inf
+    web = near.distance - (pattern.diameter[near.first] + pattern.diameter[near.second]) / 2
+    return float(web.min())
+
+
+def min_margin(pattern: Pattern, region: Region) -> float:
+    """Least distance from a feature's edge to the region's boundary; inf when there is no such pair."""
+    if not len(pattern) or not len(region.boundary_segments):
+        return np.inf
+    distance = boundary_distance(pattern.position, region.boundary_segments)
+    return float((distance - pattern.diameter / 2).min())
+
+
+def open_area(pattern: Pattern, region: Region) -> float:
+    """Share of the region's area that the features, as circles of their diameter, take."""
+    return float(np.pi / 4 * (pattern.diameter**2).sum() / region.area)
+
+
+@dataclass(frozen=True)
+class Neighbours:
+    """Directed pairs of neighbouring bubbles, m of them, grouped by the first.
+
+    first, second: (m,) indices of bubbles
+    distance: (m,) straight distance of the two centres
+    angle: (m,) direction from first to second in the tangent plane of the first, from an arbitrary zero
+    """
+
+    first: Ints
+    second: Ints
+    distance: Floats
+    angle: Floats
+
+
+def neighbours(position: Floats, normal: Floats, pitch: Floats) -> Neighbours:
+    """Delaunay neighbours of every bubble in its own tangent plane and sheet, no farther than REACH pitches.
+
+    The bubbles around one are turned into its tangent plane about it with their distances kept; those whose
+    bisectors bound its Voronoi cell there are its neighbours (the dual of the Delaunay triangulation). The
+    nearest few bound the cell almost always; where a farther one could still reach it, more are looked at.
+
+    position: (n, 3); normal: (n, 3) unit; pitch: (n,)
+    """
+    axes = _tangent_axes(normal)
+    tree = cKDTree(position)
+    rows = np.arange(len(position))
+    found = []
+    for candidates in CANDIDATES:
+        k = min(candidates, len(position) - 1)
+        if k < 1 or not len(rows):
+            break
+        step = max(1, 300_000 // k**2)  # a chunk's k x k tables of bisectors stay in the processor's cache
+        last = k == len(position) - 1 or candidates == CANDIDATES[-1]
+        unsure = []
+        for start in range(0, len(rows), step):
+            chunk = rows[start : start + step]
+            pairs, sure = _star(chunk, k, tree, position, normal, axes, pitch)
+            keep = sure | last
+            found.append(tuple(column[keep[pairs[0]]] for column in (chunk[pairs[0]], *pairs[1:])))
+            unsure.append(chunk[~keep])
+        rows = np.concatenate(unsure)
+    if not found:
+        none = np.zeros(0, np.int64)
+        return Neighbours(none, none, np.zeros(0), np.zeros(0))
+    first, second, distance, angle = (np.concatenate(column) for column in zip(*found, strict=True))
+    grouped = np.argsort(first, kind="stable")
+    return Neighbours(first[grouped], second[grouped], distance[grouped], angle[grouped])
+
+
+def _star(
+    rows: Ints, k: int, tree: cKDTree, position: Floats, normal: Floats, axes: Floats, pitch: Floats
+) -> tuple[tuple[Ints, Ints, Floats, Floats], Bools]:
+    """Neighbours of the bubbles `rows` among the k nearest of each.
+
+    Returns the pairs as (index into rows, second, distance, angle), and for every row whether nobody beyond
+    the k nearest could be a neighbour as well.
+    """
+    size = pitch[rows, None]
+    distance, other = tree.query(position[rows], k + 1)
+    own = other == rows[:, None]
+    own[~own.any(axis=1), -1] = True  # more than k bubbles in one place: any one of them is as good
+    distance, other = distance[~own].reshape(-1, k), other[~own].reshape(-1, k)
+    offset = position[other] - position[rows, None]
+    flat = np.matmul(offset, axes[rows].swapaxes(1, 2))
+    length = np.sqrt(flat[..., 0] ** 2 + flat[..., 1] ** 2)
+    seen = (distance <= HORIZON * size) & (length > 0)
+    seen &= _same_sheet(offset, normal[rows, None], normal[other], distance)
+    flat *= (distance / np.where(seen, length, 1.0) / size)[..., None]
+    cell, radius = _bounds_cell(flat, seen)
+    sure = np.minimum(2 * radius, HORIZON) * pitch[rows] <= distance[:, -1]
+    cell &= distance <= REACH * size
+    i, j = np.nonzero(cell)
+    angle = np.arctan2(flat[i, j, 1], flat[i, j, 0])
+    return (i, other[i, j], distance[i, j], angle), sure
+
+
+def boundary_distance(points: Floats, segments: Floats) -> Floats:
+    """Distance of every point to the nearest of the boundary's segments, (n,); inf when there are none.
+
+    points: (n, 3); segments: (S, 2, 3). Exact: the segments are cut into short pieces; the pieces with the
+    nearest midpoints are measured, more of them until none left out can be nearer.
+    """
+    best = np.full(len(points), np.inf)
+    if not len(segments) or not len(points):
+        return best
+    pieces = _short_pieces(segments)
+    middle = pieces.mean(axis=1)
+    half = np.linalg.norm(pieces[:, 1] - pieces[:, 0], axis=1).max() / 2
+    tree = cKDTree(middle)
+    open_rows = np.arange(len(points))
+    k = min(4, len(pieces))
+    while len(open_rows):
+        step = max(1, 1_000_000 // k)
+        beyond = np.empty(len(open_rows))
+        for start in range(0, len(open_rows), step):
+            rows = open_rows[start : start + step]
+            reach, piece = tree.query(points[rows], np.arange(1, k + 1))
+            best[rows] = _point_segment(points[rows, None], pieces[piece]).min(axis=1)
+            beyond[start : start + step] = reach[:, -1] - half
+        open_rows = open_rows[beyond < best[open_rows]] if k < len(pieces) else open_rows[:0]
+        k = min(2 * k, len(pieces))
+    return best
+
+
+def _short_pieces(segments: Floats) -> Floats:
+    """The same line in pieces of about even length, (P, 2, 3), at most about twice as many as segments."""
+    a, b = segments[:, 0], segments[:, 1]
+    length = np.linalg.norm(b - a, axis=1)
+    longest = length.sum() / max(len(segments), 64)
+    count = np.maximum(np.ceil(length / longest), 1).astype(int) if longest > 0 else np.ones(len(a), int)
+    owner = np.repeat(np.arange(len(a)), count)
+    index = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
+    start = (index / count[owner])[:, None]
+    end = ((index + 1) / count[owner])[:, None]
+    along = (b - a)[owner]
+    return np.stack([a[owner] + start * along, a[owner] + end * along], axis=1)
+
+
+def _point_segment(points: Floats, segments: Floats) -> Floats:
+    """Distances of points (..., 3) to segments (..., 2, 3), broadcast."""
+    a = segments[..., 0, :]
+    along = segments[..., 1, :] - a
+    to = points - a
+    squared = np.einsum("...c,...c->...", along, along)
+    share = np.einsum("...c,...c->...", to, along) / np.where(squared > 0, squared, 1.0)
+    return np.linalg.norm(to - np.clip(share, 0.0, 1.0)[..., None] * along, axis=-1)
+
+
+def _tangent_axes(normal: Floats) -> Floats:
+    """Two unit vectors across every unit normal, (n, 2, 3), right-handed with it."""
+    least = np.eye(3)[np.abs(normal).argmin(axis=1)]
+    first = np.cross(normal, least)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([first, np.cross(normal, first)], axis=1)
+
+
+def _same_sheet(offset: Floats, normal: Floats, other: Floats, distance: Floats) -> Bools:
+    """Whether bubbles `offset` away with normals `other` lie on the sheet of those with `normal`, (n, k).
+
+    Along an arc the chord is perpendicular to the mean of the two normals, whatever the curvature; between
+    two sheets that face the same way it is not, and sheets back to back have opposite normals.
+    """
+    cosine = np.einsum("nkc,nkc->nk", np.broadcast_to(normal, other.shape), other)
+    mean = normal + other
+    height = np.abs(np.einsum("nkc,nkc->nk", offset, mean))
+    return (cosine > SHEET_TURN) & (height <= SHEET_STEP * distance * np.linalg.norm(mean, axis=2))
+
+
+def _bounds_cell(flat: Floats, seen: Bools) -> tuple[Bools, Floats]:
+    """Whose bisectors bear an edge of the origin's Voronoi cell, (n, k), and the cell's radius, (n,).
+
+    flat: (n, k, 2) places around the origin, in pitches. A place on the bisector of j is p_j / 2 + t perp(p_j);
+    every other point m bounds t there: t perp(p_j) . p_m <= (|p_m|^2 - p_j . p_m) / 2.
+    """
+    x, y = flat[..., 0], flat[..., 1]
+    square = x * x + y * y
+    cross = x[:, :, None] * y[:, None, :] - y[:, :, None] * x[:, None, :]
+    free = (square[:, None, :] - np.matmul(flat, flat.swapaxes(1, 2))) / 2
+    cross = np.where(seen[:, None, :], cross, np.nan)  # a nan bounds nothing
+    level = np.abs(cross) < 1e-12
+    hidden = (level & (free < -1e-12)).any(axis=2)  # straight behind a nearer one
+    with np.errstate(divide="ignore", invalid="ignore"):
+        bound = free / cross
+    high = np.where(cross >= 1e-12, bound, np.inf).min(axis=2)
+    low = np.where(cross <= -1e-12, bound, -np.inf).max(axis=2)
+    cell = seen & ~hidden & ((high - low) * np.sqrt(square) > FLAT_CORNER)
+    farthest = np.sqrt(square * (0.25 + np.maximum(high**2, low**2)))
+    return cell, np.where(cell, farthest, 0.0).max(axis=1)
+
+
+def _mean(values: Floats | Bools) -> float:
+    return float(values.mean()) if len(values) else np.nan
+
+
+def _variation(values: Floats) -> float:
+    return float(values.std() / values.mean()) if len(values) else np.nan
