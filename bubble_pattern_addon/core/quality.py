@@ -95,7 +95,7 @@ def measure_points(
 
 
 def min_web(pattern: Pattern) -> float:
-    """Least material between features on one sheet, |xi - xj| - (di + dj) / 2; inf when none are neighbours."""
+    """Least material between features of one sheet, |xi - xj| - (di + dj) / 2; inf without neighbours."""
     near = neighbours(pattern.position, pattern.normal, pattern.pitch)
     if not len(near.first):
         return np.inf
@@ -268,8 +268,8 @@ def _same_sheet(offset: Floats, normal: Floats, other: Floats, distance: Floats)
 def _bounds_cell(flat: Floats, seen: Bools) -> tuple[Bools, Floats]:
     """Whose bisectors bear an edge of the origin's Voronoi cell, (n, k), and the cell's radius, (n,).
 
-    flat: (n, k, 2) places around the origin, in pitches. A place on the bisector of j is p_j / 2 + t perp(p_j);
-    every other point m bounds t there: t perp(p_j) . p_m <= (|p_m|^2 - p_j . p_m) / 2.
+    flat: (n, k, 2) in pitches; seen: (n, k) which of them count. A place on the bisector of j is
+    p_j / 2 + t perp(p_j); every other point m bounds t there: t perp(p_j) . p_m <= (|p_m|^2 - p_j . p_m) / 2.
     """
     x, y = flat[..., 0], flat[..., 1]
     square = x * x + y * y
