@@ -47,9 +47,10 @@ def draw(
 ) -> Quality:
     """Picture of bubbles seen along `view`, written to `path`; returns what was measured on them.
 
-    position: (n, 3), or (n, 2) in the plane z = 0; pitch: number or (n,); normal: (n, 3), up when None; row: (n,),
-    none in the first row when None; diameter: (n,), the pitch when None; boundary_segments: (S, 2, 3). Bubbles
-    facing away from the viewer are left out. The picture's longer side is `pixels`. labels: write the bubbles' numbers.
+    position: (n, 3), or (n, 2) in the plane z = 0; pitch: number or (n,); normal: (n, 3), up when None;
+    row: (n,), none in the first row when None; diameter: (n,), the pitch when None; boundary_segments: (S, 2, 3).
+    Bubbles facing away from the viewer are left out. pixels: the picture's longer side. labels: write the
+    bubbles' numbers.
     """
     import matplotlib.pyplot as plt
 
@@ -105,7 +106,7 @@ def _add_bubbles(
     interior: Any,
     row: Ints,
 ) -> None:
-    """Discs in their tangent planes; those not interior are pale, their number of neighbours means nothing."""
+    """Discs in their tangent planes; pale where not interior, as their number of neighbours means nothing."""
     from matplotlib.collections import PolyCollection
 
     right, up = screen
@@ -152,6 +153,8 @@ def _words(n: int, quality: Quality) -> str:
 
 def main() -> None:
     """Run the pipeline on one of the shapes and draw its pattern."""
+    from bubble_pattern_addon.core.pipeline import pattern_steps
+
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
