@@ -1,0 +1,109 @@
+"""A tree of boxes round the triangles of a mesh, asked many questions at once.
+
+Triangles are sorted along a Morton curve and paired up level by level, so the tree is a handful of plain
+arrays and a query is a frontier of (question, box) pairs that descends one level per pass: no recursion, no
+loop over triangles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .mesh import Bools, Floats, Ints
+
+Overlap = Callable[[Ints, Floats, Floats], Bools]
+"""(questions (m,), box middles (m, 3), box half sizes (m, 3)) -> (m,) may that question meet that box?"""
+
+
+@dataclass(frozen=True)
+class BoxTree:
+    """order: (T,) triangles along the curve; middle, half: per level, from single triangles up to one box,
+    (m, 3).
+    """
+
+    order: Ints
+    middle: tuple[Floats, ...]
+    half: tuple[Floats, ...]
+
+
+def build_tree(corners: Floats) -> BoxTree:
+    """Tree over triangles given by their `corners`, (T, 3, 3), T at least 1."""
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    order = np.argsort(_morton(low + high), kind="stable")
+    low, high = low[order], high[order]
+    middle, half = [], []
+    while True:
+        middle.append((low + high) / 2)
+        # rounding of the middle must not shrink a box
+        half.append(np.maximum(high - middle[-1], middle[-1] - low) * (1 + 1e-15))
+        if len(low) == 1:
+            return BoxTree(order, tuple(middle), tuple(half))
+        starts = np.arange(0, len(low), 2)
+        low, high = np.minimum.reduceat(low, starts), np.maximum.reduceat(high, starts)
+
+
+def meeting(tree: BoxTree, questions: int, overlap: Overlap) -> tuple[Ints, Ints]:
+    """All pairs (question, triangle) that `overlap` lets pass on every level; sorted by question, then
+    triangle.
+    """
+    asked = np.arange(questions)
+    box = np.zeros(questions, dtype=np.int64)
+    for level in range(len(tree.middle) - 1, -1, -1):
+        passed = overlap(asked, tree.middle[level][box], tree.half[level][box])
+        asked, box = asked[passed], box[passed]
+        if level:
+            asked, box = np.repeat(asked, 2), np.stack([2 * box, 2 * box + 1], axis=1).ravel()
+            there = box < len(tree.middle[level - 1])
+            asked, box = asked[there], box[there]
+    triangle = tree.order[box]
+    by_question = np.lexsort((triangle, asked))
+    return asked[by_question], triangle[by_question]
+
+
+def meeting_cylinders(tree: BoxTree, start: Floats, end: Floats, radius: Floats) -> tuple[Ints, Ints]:
+    """Pairs (cylinder, triangle) whose boxes may meet: cylinders from `start` to `end`, (n, 3), of `radius`
+    (n,).
+    """
+    axis = end - start
+    length = np.linalg.norm(axis, axis=1)
+    along = axis / length[:, None]
+    centre = (start + end) / 2
+    reach = np.abs(axis) / 2 + radius[:, None]
+
+    def overlap(which: Ints, middle: Floats, half: Floats) -> Bools:
+        offset = middle - centre[which]
+        direction = along[which]
+        close = np.all(np.abs(offset) <= reach[which] + half, axis=1)
+        height = np.einsum("ij,ij->i", offset, direction)
+        aside = np.einsum("ij,ij->i", offset, offset) - height**2
+        sphere = radius[which] + np.sqrt(np.einsum("ij,ij->i", half, half))
+        return close & (aside <= sphere**2 * (1 + 1e-9))
+
+    return meeting(tree, len(start), overlap)
+
+
+def _morton(points: Floats) -> Ints:
+    """Place of each of `points`, (n, 3), on a Morton curve of 21 bits per axis."""
+    low = points.min(axis=0)
+    size = max(float((points.max(axis=0) - low).max()), np.finfo(float).tiny)
+    cells = ((points - low) / size * (2**21 - 1)).astype(np.uint64)
+    code = np.zeros(len(points), dtype=np.uint64)
+    for axis in range(3):
+        code |= _spread(cells[:, axis]) << np.uint64(axis)
+    return code.astype(np.int64)
+
+
+def _spread(bits: np.ndarray) -> np.ndarray:
+    """Two empty bits between each of the lower 21 bits."""
+    for shift, mask in (
+        (32, 0x1F00000000FFFF),
+        (16, 0x1F0000FF0000FF),
+        (8, 0x100F00F00F00F00F),
+        (4, 0x10C30C30C30C30C3),
+        (2, 0x1249249249249249),
+    ):
+        bits = (bits | (bits << np.uint64(shift))) & np.uint64(mask)
+    return bits

@@ -1,0 +1,249 @@
+"""The near wall under every feature: how thick it is, where a straight cutter must start and end.
+
+A feature looks down its axis at the disc it covers. Every triangle of the base is cut to that disc in closed
+form, so what is measured holds for the whole disc and not for a few sample rays: a sloping far side, a rib
+half under the hole or a next wall close behind are seen wherever they are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from .boxtree import BoxTree, meeting_cylinders
+from .mesh import Bools, Floats, Ints, Mesh
+from .pattern import Pattern
+
+STEEPEST = 3.0
+"""Times its radius that the surface may rise or fall under a feature (about 72 degrees) before it counts as
+folded.
+"""
+CLEARANCE = 0.2
+"""Times its radius that a cutter stands over the surface, and out of the wall's far side, where there is
+room.
+"""
+DEEPEST = 20.0
+"""Times its diameter that a through-hole may be deep unless the recipe says otherwise."""
+BLOCK = 4096
+"""Features looked at together: bounds the memory."""
+
+
+class Fault(IntEnum):
+    """Why a feature cannot be cut."""
+
+    NONE = 0
+    OFF = 1
+    FOLDED = 2
+    THICK = 3
+    CROWDED = 4
+    BREAKS = 5
+    MEETS = 6
+
+
+@dataclass(frozen=True)
+class NearWall:
+    """Heights along the features' normals, 0 at their centres, outward positive; all (n,).
+
+    thickness: of the wall along the axis; nan where no far side was found
+    top: where a cutter starts, clear of the surface and of what hangs above it
+    far: lowest point of the wall's far side under the disc; nan where none was found
+    near_far: highest point of that far side
+    bottom: where a through cutter ends, clear of the far side and of the next wall
+    fault: Fault of a through-hole there
+    axis_feature, axis_triangle, axis_height: (k,) every crossing of a feature's axis with a triangle of the
+        base
+    """
+
+    thickness: Floats
+    top: Floats
+    far: Floats
+    near_far: Floats
+    bottom: Floats
+    fault: Ints
+    axis_feature: Ints
+    axis_triangle: Ints
+    axis_height: Floats
+
+
+def near_wall(base: Mesh, tree: BoxTree, pattern: Pattern, deepest: Floats) -> NearWall:
+    """Wall under every feature of `pattern`, looked for down to `deepest`, (n,), below its centre."""
+    blocks = []
+    for start in range(0, max(len(pattern), 1), BLOCK):
+        ids = np.arange(start, min(start + BLOCK, len(pattern)))
+        blocks.append(_look(base, tree, pattern, ids, deepest[ids]))
+    return NearWall(*(np.concatenate(parts) for parts in zip(*blocks, strict=True)))
+
+
+def _look(base: Mesh, tree: BoxTree, pattern: Pattern, ids: Ints, deepest: Floats) -> tuple[np.ndarray, ...]:
+    """One block of `near_wall`: the fields of NearWall."""
+    centre, normal, radius = pattern.position[ids], pattern.normal[ids], pattern.diameter[ids] / 2
+    up = (STEEPEST + 2 * CLEARANCE) * radius
+    down = deepest + 2 * radius
+    owner, triangle = meeting_cylinders(
+        tree, centre + up[:, None] * normal, centre - down[:, None] * normal, radius
+    )
+    spans = disc_spans(_local(base, pattern, ids, owner, triangle), radius[owner])
+    owner, triangle, spans = owner[spans.inside], triangle[spans.inside], spans.only(spans.inside)
+    sheets = _Sheets(owner, spans, 1e-6 * radius)
+
+    front, back = spans.facing > 0, spans.facing < 0
+    upright = spans.facing == 0
+    surface_low, surface_high = sheets.grow(front | upright, np.zeros(len(ids)))
+    on_base = sheets.any(front & (spans.low <= sheets.slack[owner]) & (spans.high >= -sheets.slack[owner]))
+    below = back & np.isfinite(spans.axis) & (spans.axis < -sheets.slack[owner])
+    first = sheets.highest(below, spans.axis)
+    thickness = np.where(np.isfinite(first), -first, np.nan)
+    far_low, far_high = sheets.grow(back | upright, np.where(np.isfinite(first), first, np.nan))
+
+    over = sheets.lowest(spans.low > surface_high[owner] + sheets.slack[owner], spans.low)
+    under = sheets.highest(spans.high < far_low[owner] - sheets.slack[owner], spans.high)
+    clear = CLEARANCE * radius
+    top = surface_high + np.minimum(clear, (over - surface_high) / 2)
+    bottom = far_low - np.minimum(clear, (far_low - under) / 2)
+    # another wall's front that starts above the lowest point of this wall's far side
+    beside = sheets.any(
+        front
+        & (spans.high < surface_low[owner] - sheets.slack[owner])
+        & (spans.high >= far_low[owner] - sheets.slack[owner])
+    )
+    fault = np.zeros(len(ids), dtype=np.int64)
+    fault[beside] = Fault.CROWDED
+    fault[~np.isfinite(thickness) | (-far_low > deepest)] = Fault.THICK
+    fault[(surface_high > STEEPEST * radius) | (surface_low < -STEEPEST * radius)] = Fault.FOLDED
+    fault[~on_base] = Fault.OFF
+    crosses = np.isfinite(spans.axis)
+    crossing = (ids[owner[crosses]], triangle[crosses], spans.axis[crosses])
+    return (thickness, top, far_low, far_high, bottom, fault, *crossing)
+
+
+def _local(base: Mesh, pattern: Pattern, ids: Ints, owner: Ints, triangle: Ints) -> Floats:
+    """Corners of each triangle in the frame of its feature, z along the normal, (m, 3, 3)."""
+    normal = pattern.normal[ids]
+    tangent = pattern.tangent[ids]
+    tangent = tangent - np.einsum("ij,ij->i", tangent, normal)[:, None] * normal
+    tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+    frame = np.stack([tangent, np.cross(normal, tangent), normal], axis=1)
+    offset = base.vertices[base.triangles[triangle]] - pattern.position[ids][owner][:, None]
+    return np.einsum("mck,mak->mca", offset, frame[owner])
+
+
+@dataclass(frozen=True)
+class Spans:
+    """What a disc looking down its axis sees of triangles; all (m,).
+
+    low, high: heights of the part inside the disc; inside: is there such a part; facing: 1 towards the
+    viewer, -1 away, 0 edge-on; axis: height where the axis crosses the triangle, nan where it does not
+    """
+
+    low: Floats
+    high: Floats
+    inside: Bools
+    facing: Ints
+    axis: Floats
+
+    def only(self, chosen: Bools) -> Spans:
+        return Spans(
+            self.low[chosen], self.high[chosen], self.inside[chosen], self.facing[chosen], self.axis[chosen]
+        )
+
+
+def disc_spans(local: Floats, radius: Floats) -> Spans:
+    """Cut triangles `local`, (m, 3, 3), to the cylinder of `radius`, (m,), round the z axis.
+
+    Height is linear on a triangle, so over triangle and disc together it is extreme at a corner inside the
+    disc, where an edge crosses the circle, or at the two points of the circle along the gradient, if they
+    lie in the triangle.
+    """
+    flat, height = local[..., :2], local[..., 2]
+    along = np.roll(local, -1, axis=1) - local
+    low, high = np.full(len(local), np.inf), np.full(len(local), -np.inf)
+
+    def take(heights: Floats, valid: Bools) -> None:
+        np.minimum(low, np.where(valid, heights, np.inf).min(axis=1), out=low)
+        np.maximum(high, np.where(valid, heights, -np.inf).max(axis=1), out=high)
+
+    distance = np.einsum("mck,mck->mc", flat, flat) - radius[:, None] ** 2
+    take(height, distance <= 0)
+    square = np.einsum("mck,mck->mc", along[..., :2], along[..., :2])
+    half = np.einsum("mck,mck->mc", along[..., :2], flat)
+    root = half**2 - square * distance
+    crossing = (root >= 0) & (square > 0)
+    root, square = np.sqrt(np.where(crossing, root, 0)), np.where(crossing, square, 1)
+    for sign in (-1, 1):
+        share = (sign * root - half) / square
+        take(height + share * along[..., 2], crossing & (share >= 0) & (share <= 1))
+
+    plane = np.cross(along[:, 0], along[:, 1])
+    size = np.linalg.norm(plane, axis=1)
+    facing = np.where(np.abs(plane[:, 2]) > 1e-6 * size, np.sign(plane[:, 2]), 0).astype(np.int64)
+    slope = np.linalg.norm(plane[:, :2], axis=1)
+    uphill = np.where(
+        slope[:, None] > 1e-12 * size[:, None],
+        plane[:, :2] / np.maximum(slope, np.finfo(float).tiny)[:, None],
+        [1.0, 0.0],
+    )
+    for point in (radius[:, None] * uphill, -radius[:, None] * uphill):
+        found = _height_at(local, along, plane, facing, point, radius)
+        take(found[:, None], np.isfinite(found)[:, None])
+    axis = _height_at(local, along, plane, facing, np.zeros_like(uphill), radius)
+    return Spans(low, high, high >= low, facing, axis)
+
+
+def _height_at(
+    local: Floats, along: Floats, plane: Floats, facing: Ints, point: Floats, radius: Floats
+) -> Floats:
+    """Height of each triangle over `point`, (m, 2); nan where the point is outside (edges count as
+    inside).
+    """
+    offset = point[:, None] - local[..., :2]
+    side = along[..., 0] * offset[..., 1] - along[..., 1] * offset[..., 0]
+    slack = 1e-9 * radius[:, None] * (np.abs(along[..., 0]) + np.abs(along[..., 1]))
+    inside = np.all(side * facing[:, None] >= -slack, axis=1) & (facing != 0)
+    fall = np.einsum("mk,mk->m", plane[:, :2], offset[:, 0])
+    return np.where(inside, local[:, 0, 2] - fall / np.where(inside, plane[:, 2], 1), np.nan)
+
+
+@dataclass(frozen=True)
+class _Sheets:
+    """Spans gathered per feature. owner: (m,) feature of each span; slack: (n,) heights closer than this are
+    equal.
+    """
+
+    owner: Ints
+    spans: Spans
+    slack: Floats
+
+    def lowest(self, chosen: Bools, heights: Floats) -> Floats:
+        found = np.full(len(self.slack), np.inf)
+        np.minimum.at(found, self.owner[chosen], heights[chosen])
+        return found
+
+    def highest(self, chosen: Bools, heights: Floats) -> Floats:
+        found = np.full(len(self.slack), -np.inf)
+        np.maximum.at(found, self.owner[chosen], heights[chosen])
+        return found
+
+    def any(self, chosen: Bools) -> Bools:
+        return np.bincount(self.owner[chosen], minlength=len(self.slack)) > 0
+
+    def grow(self, chosen: Bools, seed: Floats) -> tuple[Floats, Floats]:
+        """Lowest and highest of the chosen spans that hang together with the height `seed`, both (n,).
+
+        A sheet is connected, so the heights it takes over the disc are one interval without gaps.
+        """
+        low, high = seed.copy(), seed.copy()
+        slack = self.slack[self.owner]
+        waiting = chosen.copy()
+        while True:
+            touching = (
+                waiting
+                & (self.spans.low <= high[self.owner] + slack)
+                & (self.spans.high >= low[self.owner] - slack)
+            )
+            if not touching.any():
+                return low, high
+            waiting &= ~touching
+            np.minimum.at(low, self.owner[touching], self.spans.low[touching])
+            np.maximum.at(high, self.owner[touching], self.spans.high[touching])
