@@ -48,9 +48,9 @@ def draw(
     """Picture of bubbles seen along `view`, written to `path`; returns what was measured on them.
 
     position: (n, 3), or (n, 2) in the plane z = 0; pitch: number or (n,); normal: (n, 3), up when None;
-    row: (n,), none in the first row when None; diameter: (n,), the pitch when None; boundary_segments: (S, 2, 3).
-    Bubbles facing away from the viewer are left out. pixels: the picture's longer side. labels: write the
-    bubbles' numbers.
+    row: (n,), none in the first row when None; diameter: (n,), the pitch when None; boundary_segments:
+    (S, 2, 3). Bubbles facing away from the viewer are left out. pixels: the picture's longer side.
+    labels: write the bubbles' numbers.
     """
     import matplotlib.pyplot as plt
 

@@ -182,12 +182,13 @@ def _star(
     offset = position[other] - position[rows, None]
     flat = np.matmul(offset, axes[rows].swapaxes(1, 2))
     length = np.sqrt(flat[..., 0] ** 2 + flat[..., 1] ** 2)
-    seen = (distance <= HORIZON * size) & (length > 0)
-    seen &= _same_sheet(offset, normal[rows, None], normal[other], distance)
+    near = (distance <= HORIZON * size) & _same_sheet(offset, normal[rows, None], normal[other], distance)
+    seen = near & (length > 0)
     flat *= (distance / np.where(seen, length, 1.0) / size)[..., None]
     cell, radius = _bounds_cell(flat, seen)
     sure = np.minimum(2 * radius, HORIZON) * pitch[rows] <= distance[:, -1]
     cell &= distance <= REACH * size
+    cell |= near & (distance == 0)
     i, j = np.nonzero(cell)
     angle = np.arctan2(flat[i, j, 1], flat[i, j, 0])
     return (i, other[i, j], distance[i, j], angle), sure
@@ -269,7 +270,7 @@ def _bounds_cell(flat: Floats, seen: Bools) -> tuple[Bools, Floats]:
     """Whose bisectors bear an edge of the origin's Voronoi cell, (n, k), and the cell's radius, (n,).
 
     flat: (n, k, 2) in pitches; seen: (n, k) which of them count. A place on the bisector of j is
-    p_j / 2 + t perp(p_j); every other point m bounds t there: t perp(p_j) . p_m <= (|p_m|^2 - p_j . p_m) / 2.
+    p_j / 2 + t perp(p_j); every other point m bounds t: t perp(p_j) . p_m <= (|p_m|^2 - p_j . p_m) / 2.
     """
     x, y = flat[..., 0], flat[..., 1]
     square = x * x + y * y
@@ -282,6 +283,7 @@ def _bounds_cell(flat: Floats, seen: Bools) -> tuple[Bools, Floats]:
         bound = free / cross
     high = np.where(cross >= 1e-12, bound, np.inf).min(axis=2)
     low = np.where(cross <= -1e-12, bound, -np.inf).max(axis=2)
+    square = np.where(seen, square, 1.0)
     cell = seen & ~hidden & ((high - low) * np.sqrt(square) > FLAT_CORNER)
     farthest = np.sqrt(square * (0.25 + np.maximum(high**2, low**2)))
     return cell, np.where(cell, farthest, 0.0).max(axis=1)
@@ -292,4 +294,4 @@ def _mean(values: Floats | Bools) -> float:
 
 
 def _variation(values: Floats) -> float:
-    return float(values.std() / values.mean()) if len(values) else np.nan
+    return float(values.std() / values.mean()) if values.any() else np.nan
