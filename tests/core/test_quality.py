@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
-from scipy.spatial import Delaunay
+from scipy.spatial import Voronoi
 from scipy.spatial.transform import Rotation
 
 from bubble_pattern_addon.core.mesh import Floats, Mesh
@@ -162,15 +162,21 @@ def test_planar_neighbours_are_the_delaunay_edges(seed: int, jitter: float):
     rng = np.random.default_rng(seed)
     points = hexagonal(24, 24)
     points[:, :2] += rng.normal(0, jitter, (len(points), 2))
-    start, end = Delaunay(points[:, :2]).vertex_neighbor_vertices
-    first = np.repeat(np.arange(len(points)), np.diff(start))
-    short = np.linalg.norm(points[first] - points[end], axis=1) < REACH
-    # at the rim Delaunay's triangles reach out to bubbles beyond any horizon
+    cells = Voronoi(points[:, :2])
+    # at the rim the cells reach out beyond any horizon; where four lie on one circle, either diagonal is right
     core = boundary_distance(points, frame(points, 0.0)) > 4
-    keep = short & core[first]
-    wanted = set(zip(first[keep].tolist(), end[keep].tolist(), strict=True))
-    found = {pair for pair in pairs(points, up(points), np.ones(len(points))) if core[pair[0]]}
-    assert found == wanted
+    short = (
+        np.linalg.norm(points[cells.ridge_points[:, 0]] - points[cells.ridge_points[:, 1]], axis=1) < REACH
+    )
+    keep = short & core[cells.ridge_points].all(axis=1)
+    start, end = np.array(cells.ridge_vertices)[keep].T
+    clear = np.linalg.norm(cells.vertices[start] - cells.vertices[end], axis=1) > 1e-5
+    edges = np.sort(cells.ridge_points[keep], axis=1)
+    found = {(i, j) for i, j in pairs(points, up(points), np.ones(len(points))) if core[i] and core[j]}
+    assert all((j, i) in found for i, j in found)
+    ascending = {(i, j) for i, j in found if i < j}
+    assert {tuple(edge) for edge in edges[clear].tolist()} <= ascending
+    assert ascending <= {tuple(edge) for edge in edges.tolist()}
 
 
 def test_neighbours_on_a_sphere_obey_euler():
