@@ -112,17 +112,25 @@ def neat(length: float) -> float:
     return float(f"{mantissa}e{exponent}")
 
 
-def default_recipe(area: float, choice: RegionChoice | None = None) -> Recipe:
-    """A good recipe for a target region of this area: about 500 features, diameter 0.6 of the pitch.
+def default_recipe(area: float, perimeter: float = 0.0, choice: RegionChoice | None = None) -> Recipe:
+    """A good recipe for a target region of this area and with boundary loops of this length in all.
 
-    In a hexagonal arrangement one bubble takes sqrt(3)/2 pitch^2 of the surface. The panel starts from
-    this recipe, and a recipe file that leaves lengths out is filled up from it.
+    About 500 features, in a hexagonal arrangement where one bubble takes sqrt(3)/2 pitch^2 of the surface; a
+    narrow strip, about 2 area / perimeter wide, gets at least three rows. The diameter is 0.6 of the pitch.
+    The panel starts from this recipe, and a recipe file that leaves lengths out is filled up from it.
     """
-    pitch = neat(math.sqrt(area / FEATURES_WISHED * 2 / math.sqrt(3))) if area > 0 else 3.0
-    recipe = Recipe(
-        packing=Packing(pitch=Constant(pitch)), shaping=Shaping(diameter=Constant(_round(FILL * pitch)))
+    if not area > 0:
+        return Recipe(region=choice or RegionChoice())
+    pitch = math.sqrt(area / FEATURES_WISHED * 2 / math.sqrt(3))
+    if perimeter > 0:
+        # three rows touching both boundaries are 1 + sqrt(3) pitches wide
+        pitch = min(pitch, 2 * area / perimeter / (1 + math.sqrt(3)))
+    pitch = neat(pitch)
+    return Recipe(
+        region=choice or RegionChoice(),
+        packing=Packing(pitch=Constant(pitch)),
+        shaping=Shaping(diameter=Constant(_round(FILL * pitch))),
     )
-    return replace(recipe, region=choice) if choice else recipe
 
 
 # -- from TOML ---------------------------------------------------------------------------------------------

@@ -83,7 +83,7 @@ def test_neat_lengths_are_close_and_short(length: float) -> None:
 
 @given(st.floats(1e-8, 1e8))
 def test_the_default_aims_at_about_500_features(area: float) -> None:
-    recipe = default_recipe(area, RegionChoice(all=True))
+    recipe = default_recipe(area, choice=RegionChoice(all=True))
     pitch = recipe.packing.pitch
     assert isinstance(pitch, Constant)
     assert 400 < area / (math.sqrt(3) / 2 * pitch.value**2) < 625
@@ -91,12 +91,21 @@ def test_the_default_aims_at_about_500_features(area: float) -> None:
     check_recipe(recipe)
 
 
+@given(st.floats(1e-3, 1e3), st.floats(10, 1e4))
+def test_a_narrow_strip_gets_three_rows_by_default(width: float, ratio: float) -> None:
+    length = ratio * width
+    recipe = default_recipe(width * length, 2 * (width + length))
+    pitch = recipe.packing.pitch
+    assert isinstance(pitch, Constant)
+    assert (1 + math.sqrt(3)) * pitch.value < 1.11 * width
+
+
 ALL = {"region": {"all": True}}
 
 
 def test_silent_keys_are_filled_from_the_defaults() -> None:
     recipe = recipe_from_dict(ALL, default_recipe(4000.0))
-    assert recipe == default_recipe(4000.0, RegionChoice(all=True))
+    assert recipe == default_recipe(4000.0, choice=RegionChoice(all=True))
 
 
 def test_a_lone_pitch_or_diameter_keeps_the_proportion() -> None:

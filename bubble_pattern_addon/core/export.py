@@ -1,0 +1,89 @@
+"""What a run leaves for people and programs to read: the hole table and the report."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .pattern import Pattern
+from .quality import Quality, measure, min_margin, min_web, open_area
+from .region import Region
+from .solid import Part
+
+COLUMNS = ("id", "x", "y", "z", "nx", "ny", "nz", "diameter", "pitch", "row")
+
+
+def write_features(path: Path, pattern: Pattern) -> None:
+    """The hole table as CSV, one line per feature in the order of ids, with the columns COLUMNS.
+
+    x, y, z is the centre on the surface, nx, ny, nz the unit normal there, outward; lengths in the unit of
+    the base. Numbers are written so that they read back as the same double.
+    """
+    numbers = np.column_stack([pattern.position, pattern.normal, pattern.diameter, pattern.pitch])
+    with path.open("w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file)
+        table.writerow(COLUMNS)
+        table.writerows(
+            [number, *values, row]
+            for number, (values, row) in enumerate(zip(numbers.tolist(), pattern.row.tolist(), strict=True))
+        )
+
+
+def make_report(region: Region, pattern: Pattern, part: Part, seconds: Mapping[str, float]) -> dict[str, Any]:
+    """The figures of a run, ready for JSON; a figure with nothing to measure is None.
+
+    features, watertight, genus, volume, open_area, min_web, min_margin, quality{six, psi6, gap_cv, gap_min,
+    rim_cv} and seconds{region, pack, shape, add}; further wall{min, max}, the near wall's thickness at the
+    features, and problems, one sentence each, empty when the part is good.
+    """
+    figures: Quality = measure(pattern, region)
+    thickness = part.thickness[np.isfinite(part.thickness)]
+    report = {
+        "features": len(pattern),
+        "through": part.check.through,
+        "watertight": part.check.watertight,
+        "genus": part.check.genus,
+        "bodies": part.check.bodies,
+        "volume": part.check.volume,
+        "removed_volume": part.check.removed_volume,
+        "region_area": region.area,
+        "open_area": open_area(pattern, region),
+        "min_web": min_web(pattern),
+        "min_margin": min_margin(pattern, region),
+        "wall": {
+            "min": float(thickness.min()) if len(thickness) else math.nan,
+            "max": float(thickness.max()) if len(thickness) else math.nan,
+        },
+        "quality": {
+            "six": figures.six,
+            "psi6": figures.psi6,
+            "gap_cv": figures.gap_cv,
+            "gap_min": figures.gap_min,
+            "rim_cv": figures.rim_cv,
+        },
+        "seconds": {stage: round(value, 4) for stage, value in seconds.items()},
+        "problems": list(part.check.problems),
+    }
+    cleaned = _without_nonsense(report)
+    assert isinstance(cleaned, dict)
+    return cleaned
+
+
+def _without_nonsense(value: Any) -> Any:
+    """JSON knows neither nan nor inf: they become None."""
+    if isinstance(value, dict):
+        return {key: _without_nonsense(entry) for key, entry in value.items()}
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def write_report(path: Path, report: Mapping[str, Any]) -> None:
+    """The report as JSON."""
+    path.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
