@@ -17,6 +17,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from bubble_pattern_addon.core.mesh import Bools, Floats, Ints, Mesh
 
 PANEL_SIZE = 200.0
+TRAPEZOID = np.array([[-60.0, -40.0], [60.0, -40.0], [45.0, 40.0], [-45.0, 40.0]])
+TRAPEZOID_RADIUS = 12.0
+ISLAND = (20.0, 5.0, 15.0)
+"""Centre and radius of the trapezoid's island."""
 
 
 @dataclass(frozen=True)
@@ -56,8 +60,8 @@ def rounded(corners: Floats, radius: float, sides: int = 60) -> Floats:
 
 def trapezoid_outline() -> list[Floats]:
     """The rounded trapezoid with an island on which the figures to beat were measured."""
-    corners = np.array([[-60.0, -40], [60, -40], [45, 40], [-45, 40]])
-    return [rounded(corners, 12.0), circle(15.0, (20.0, 5.0))[::-1]]
+    x, y, radius = ISLAND
+    return [rounded(TRAPEZOID, TRAPEZOID_RADIUS), circle(radius, (x, y))[::-1]]
 
 
 def rectangle_outline(width: float, height: float, centre: tuple[float, float] = (0.0, 0.0)) -> list[Floats]:

@@ -163,11 +163,10 @@ def test_planar_neighbours_are_the_delaunay_edges(seed: int, jitter: float):
     points = hexagonal(24, 24)
     points[:, :2] += rng.normal(0, jitter, (len(points), 2))
     cells = Voronoi(points[:, :2])
-    # at the rim the cells reach out beyond any horizon; where four lie on one circle, either diagonal is right
+    # cells at the rim reach beyond any horizon; of four bubbles on one circle, either diagonal is right
     core = boundary_distance(points, frame(points, 0.0)) > 4
-    short = (
-        np.linalg.norm(points[cells.ridge_points[:, 0]] - points[cells.ridge_points[:, 1]], axis=1) < REACH
-    )
+    ends = points[cells.ridge_points]
+    short = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1) < REACH
     keep = short & core[cells.ridge_points].all(axis=1)
     start, end = np.array(cells.ridge_vertices)[keep].T
     clear = np.linalg.norm(cells.vertices[start] - cells.vertices[end], axis=1) > 1e-5

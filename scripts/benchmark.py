@@ -1,0 +1,304 @@
+"""Measure packing and adding against their peers in one run and print markdown tables.
+
+Ours and its peer run in turn, so that a busy machine slows both; seconds are medians, a ratio is ours by the
+peer's. Peers come with the extra `benchmark`; one that is not installed is left out with a line that says so.
+
+Example: python scripts/benchmark.py --only flat curved
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
+
+import manifold3d
+import numpy as np
+from scipy.spatial import cKDTree
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from bubble_pattern_addon.core.pipeline import pattern_steps
+
+from bubble_pattern_addon.core.mesh import Floats, Mesh
+from bubble_pattern_addon.core.metric import Constant
+from bubble_pattern_addon.core.pattern import Pattern
+from bubble_pattern_addon.core.progress import drive
+from bubble_pattern_addon.core.quality import Quality, boundary_distance, measure, measure_points
+from bubble_pattern_addon.core.recipe import Feature, Packing, Recipe, Shaping
+from bubble_pattern_addon.core.region import Region, make_region
+from bubble_pattern_addon.core.solid import Part, part_steps, plan_steps
+from scripts import peers
+from scripts.shapes import SHAPES, Shape, circle, curved_slab, plate, rectangle_outline, trapezoid_outline
+
+ENOUGH = 12.0
+"""Seconds of one measurement after which it is not repeated any more."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of a packing table. edge: least centre to boundary in pitches; mirror: see `mirrored`."""
+
+    region: str
+    method: str
+    n: int
+    seconds: float
+    quality: Quality
+    edge: float
+    mirror: float
+    ratio: float | None = None
+
+
+HEAD = "| region | method | n | seconds | ratio | six | ψ6 | gap CV | gap min | rim CV | edge | mirror |"
+
+
+def print_rows(rows: Iterable[Row]) -> None:
+    """Print packings as the lines of a table."""
+    for row in rows:
+        q = row.quality
+        figures = [
+            *(_number(row.seconds, 3), "" if row.ratio is None else f"**{row.ratio:.2f}**"),
+            *(_number(value, 3) for value in (q.six, q.psi6, q.gap_cv, q.gap_min)),
+            *(_number(q.rim_cv, 4), _number(row.edge, 4), _number(row.mirror, 2)),
+        ]
+        print(f"| {row.region} | {row.method} | {row.n:,} | {' | '.join(figures)} |", flush=True)
+
+
+def print_head(head: str) -> None:
+    """Print a table's head."""
+    print(f"\n{head}\n|{' --- |' * (head.count('|') - 1)}", flush=True)
+
+
+def _number(value: float, digits: int) -> str:
+    return f"{value:.{digits}f}" if np.isfinite(value) else "-"
+
+
+def in_turn(runs: list[Callable[[], float]], repeats: int) -> list[float]:
+    """Median of the seconds that each run returns; they take turns, `repeats` times or for ENOUGH seconds."""
+    seconds: list[list[float]] = [[] for _ in runs]
+    for _ in range(repeats):
+        for run, taken in zip(runs, seconds, strict=True):
+            if sum(taken) < ENOUGH:
+                taken.append(run())
+    return [statistics.median(taken) for taken in seconds]
+
+
+def uniform(pitch: float) -> Recipe:
+    """One pitch everywhere, holes of six tenths of it."""
+    return replace(
+        Recipe(), packing=Packing(pitch=Constant(pitch)), shaping=Shaping(diameter=Constant(0.6 * pitch))
+    )
+
+
+def pack(shape: Shape, pitch: float) -> tuple[Pattern, Region, float]:
+    """Our packing, and its seconds from the mesh and the selection to the finished pattern."""
+    start = time.perf_counter()
+    region = make_region(shape.mesh, shape.selected)
+    pattern = drive(pattern_steps(region, uniform(pitch)))
+    return pattern, region, time.perf_counter() - start
+
+
+def mirrored(position: Floats, pitch: float) -> float:
+    """Largest distance, in pitches, from a point mirrored at the plane x = 0 to the nearest point."""
+    return float(cKDTree(position).query(position * [-1, 1, 1])[0].max() / pitch)
+
+
+def our_row(name: str, shape: Shape, pitch: float, seconds: float) -> Row:
+    """Measure our packing; the seconds come from elsewhere."""
+    pattern, region, _ = pack(shape, pitch)
+    edge = boundary_distance(pattern.position, region.boundary_segments).min() / pitch
+    quality = measure(pattern, region)
+    mirror = mirrored(pattern.position, pitch) if name in SYMMETRIC else np.nan
+    return Row(name, "bubble pattern", len(pattern), seconds, quality, edge, mirror)
+
+
+def peer_row(name: str, method: str, found: peers.Arrangement, region: Region, seconds: float) -> Row:
+    """Measure a peer's points; its pitch is the spacing asked for, its first row what is nearest the rim."""
+    n = len(found.position)
+    distance = boundary_distance(found.position, region.boundary_segments)
+    row = np.where(distance < distance.min() + 0.35 * found.spacing, 0, 1)
+    pitch = np.full(n, found.spacing)
+    quality = measure_points(found.position, found.normal, pitch, row, region.boundary_segments)
+    mirror = mirrored(found.position, found.spacing) if name in SYMMETRIC else np.nan
+    return Row(name, method, n, seconds, quality, distance.min() / found.spacing, mirror)
+
+
+SYMMETRIC = ("disc", "square", "panel")
+
+
+def against(
+    name: str,
+    shape: Shape,
+    pitch: float,
+    method: str,
+    arrange: Callable[[float], peers.Arrangement] | None,
+    repeats: int,
+) -> int:
+    """Our packing and a peer at the same count in turn; prints both rows, returns our count."""
+    pattern, region, _ = pack(shape, pitch)
+    runs = [lambda: pack(shape, pitch)[2]]
+    if arrange is None:
+        print_rows([our_row(name, shape, pitch, in_turn(runs, repeats)[0])])
+        return len(pattern)
+    found = peers.at_count(arrange, pitch, len(pattern))
+    runs.append(lambda: arrange(found.spacing).seconds)
+    ours, theirs = in_turn(runs, repeats)
+    row = our_row(name, shape, pitch, ours)
+    print_rows([replace(row, ratio=ours / theirs), peer_row(name, method, found, region, theirs)])
+    return len(pattern)
+
+
+def flat(repeats: int) -> None:
+    """Flat regions against gmsh, the clipped grid and Lloyd's relaxation."""
+    print(
+        "\n## Packing, flat\n\nOur trapezoid is a coarse n-gon; gmsh meshes it with true arcs, half a pitch in."
+    )
+    print_head(HEAD)
+    gmsh = installed("gmsh")
+    trapezoid = SHAPES["trapezoid"]()
+    region = make_region(trapezoid.mesh, trapezoid.selected)
+    for pitch in (3.0, 0.95, 0.295):
+        arrange = (lambda size, pitch=pitch: peers.gmsh_trapezoid(pitch, size)) if gmsh else None
+        count = against("trapezoid", trapezoid, pitch, "gmsh frontal-Delaunay", arrange, repeats)
+        grid = peers.clipped_grid(trapezoid_outline(), pitch)
+        print_rows([peer_row("trapezoid", "clipped hexagonal grid", grid, region, grid.seconds)])
+        if count < 2000:
+            cells = peers.lloyd(trapezoid_outline(), pitch, count)
+            print_rows([peer_row("trapezoid", "Lloyd, 100 rounds", cells, region, cells.seconds)])
+    outlines = {"disc": [circle(4.147)], "square": rectangle_outline(8.294, 8.294)}
+    for name in ("disc", "square", "l", "trapezoid-fine", "mixed", "strip"):
+        shape = SHAPES[name]()
+        against(name, shape, shape.pitch, "", None, repeats)
+        if name in outlines:
+            grid = peers.clipped_grid(outlines[name], shape.pitch)
+            region = make_region(shape.mesh, shape.selected)
+            print_rows([peer_row(name, "clipped hexagonal grid", grid, region, grid.seconds)])
+    print(f"\nPeak memory of a process that packs the trapezoid finely: {peak_memory('trapezoid', 0.295)}")
+
+
+def curved(repeats: int) -> None:
+    """Curved regions against Instant Meshes."""
+    print(
+        "\n## Packing, curved\n\nInstant Meshes has its first row on the boundary, ours is half a pitch in."
+    )
+    print_head(HEAD)
+    there = installed("pynanoinstantmeshes")
+    for name, pitch in (("panel", 6.5), ("panel", 2.05), ("sphere", 6.0)):
+        shape = SHAPES[name]()
+        arrange = (lambda spacing, mesh=shape.mesh: peers.instant_meshes(mesh, spacing)) if there else None
+        against(name, shape, pitch, "Instant Meshes", arrange, repeats)
+        if there and name != "sphere":
+            free = peers.instant_meshes(shape.mesh, pitch, follow_boundary=False)
+            region = make_region(shape.mesh, shape.selected)
+            print_rows([peer_row(name, "Instant Meshes, ragged rim", free, region, free.seconds)])
+    for name in ("torus", "tube", "capsule", "fold", "thin-wall"):
+        shape = SHAPES[name]()
+        against(name, shape, shape.pitch, "", None, repeats)
+
+
+def adding(repeats: int) -> None:
+    """`part_steps` with everything it does against the bare subtraction of the same cutters."""
+    print("\n## Adding\n\n32-sided through-holes; bare: the subtraction alone, both solids built beforehand.")
+    print_head("| base | triangles | holes | ours, s | bare, s | ratio | watertight | genus | problems |")
+    cases: list[tuple[str, Shape, float]] = [
+        ("curved slab", curved_slab(), 6.5),
+        ("curved slab", curved_slab(), 2.15),
+        ("flat plate, two-triangle faces", plate(300.0, 300.0, 3.0, 2.9), 3.22),
+    ]
+    for name, shape, pitch in cases:
+        add(name, shape, pitch, repeats)
+
+
+def add(name: str, shape: Shape, pitch: float, repeats: int) -> None:
+    """One line of the table of adding."""
+    pattern = pack(shape, pitch)[0]
+    feature = Feature(kind="hole", sides=32)
+    cutters = drive(plan_steps(shape.mesh, pattern, feature)).cutters.mesh
+    parts: list[Part] = []
+
+    def ours() -> float:
+        start = time.perf_counter()
+        parts[:] = [drive(part_steps(shape.mesh, pattern, feature))]
+        return time.perf_counter() - start
+
+    mine, bare = in_turn([ours, partial(bare_subtract, shape.mesh, cutters)], repeats)
+    check = parts[0].check
+    print(
+        f"| {name} | {len(shape.mesh.triangles):,} | {check.through:,} of {len(pattern):,} "
+        f"| {mine:.2f} | {bare:.2f} | **{mine / bare:.2f}** | {check.watertight} "
+        f"| {check.genus:,} | {len(check.problems)} |",
+        flush=True,
+    )
+
+
+def bare_subtract(base: Mesh, cutters: Mesh) -> float:
+    """Seconds of one subtraction of the composed cutters and of reading its result."""
+    solid, tool = as_manifold(base), as_manifold(cutters)
+    start = time.perf_counter()
+    (solid - tool).to_mesh64()
+    return time.perf_counter() - start
+
+
+def as_manifold(mesh: Mesh) -> manifold3d.Manifold:
+    """A mesh as it is, as a manifold."""
+    return manifold3d.Manifold(
+        manifold3d.Mesh64(np.ascontiguousarray(mesh.vertices), mesh.triangles.astype(np.uint64))
+    )
+
+
+def peak_memory(name: str, pitch: float) -> str:
+    """Largest resident size of a process of its own that packs one shape."""
+    if find_spec("resource") is None:
+        return "not measured (this system does not tell)"
+    command = [sys.executable, str(Path(__file__).resolve()), "--pack-once", name, str(pitch)]
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
+
+
+def pack_once(name: str, pitch: float) -> None:
+    """Pack one shape and print the process's peak memory."""
+    import resource
+
+    pattern, _, seconds = pack(SHAPES[name](), pitch)
+    unit = 1 if sys.platform == "darwin" else 1024
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 2**20
+    print(f"{peak:,.0f} MiB for {len(pattern):,} features in {seconds:.2f} s")
+
+
+def installed(module: str) -> bool:
+    """Whether a peer is there; says so when it is not."""
+    there = find_spec(module) is not None
+    if not there:
+        print(f"\n{module} is not installed: its rows are left out (the extra benchmark)", file=sys.stderr)
+    return there
+
+
+SECTIONS: dict[str, Callable[[int], None]] = {"flat": flat, "curved": curved, "adding": adding}
+
+
+def main() -> None:
+    """Run the chosen sections."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--only", nargs="+", choices=list(SECTIONS), default=list(SECTIONS), metavar="SECTION"
+    )
+    parser.add_argument("--repeats", type=int, default=5, help="runs of which the median counts (default 5)")
+    parser.add_argument("--pack-once", nargs=2, metavar=("SHAPE", "PITCH"), help=argparse.SUPPRESS)
+    chosen = parser.parse_args()
+    if chosen.pack_once:
+        pack_once(chosen.pack_once[0], float(chosen.pack_once[1]))
+        return
+    for section in chosen.only:
+        SECTIONS[section](chosen.repeats)
+
+
+if __name__ == "__main__":
+    main()
