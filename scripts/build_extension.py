@@ -1,13 +1,14 @@
 """Build the Blender extension: one zip per platform, wheels included.
 
-    python scripts/build_extension.py                          # every platform, into dist/
-    python scripts/build_extension.py --platform linux-x64     # this one only
-    python scripts/build_extension.py --python-tag cp314       # for a Blender with another Python (a distribution's own)
-    python scripts/build_extension.py --validate               # stage and validate, build nothing
+    python scripts/build_extension.py                       # every platform, into dist/
+    python scripts/build_extension.py --platform linux-x64  # this one only
+    python scripts/build_extension.py --python-tag cp314    # for a distribution's Blender with a Python of
+    its own python scripts/build_extension.py --validate            # stage and validate, build nothing
 
-The wheels are those that blender_manifest.toml lists; pip fetches what wheels/ lacks. Then the package's files, the
-manifest and the wheels are staged into one folder (the builder wants `__init__.py` beside the manifest), and Blender's
-own builder makes the zips. The builder is `--blender PROGRAM`, or else the one in the `bpy` module of this Python.
+The wheels are those that blender_manifest.toml lists; pip fetches what wheels/ lacks. Then the package's
+files, the manifest and the wheels are staged into one folder (the builder wants `__init__.py` beside the
+manifest), and Blender's own builder makes the zips. The builder is `--blender PROGRAM`, or else the one in
+the `bpy` module of this Python.
 """
 
 from __future__ import annotations
@@ -157,7 +158,7 @@ def found_wheel(name: str, version: str, tag: str, platform: str) -> Wheel:
 
 
 def manifest_text(wheels: Sequence[Wheel], platforms: Sequence[str]) -> str:
-    """The manifest with its platforms and wheels narrowed to what is staged; everything else word for word."""
+    """The manifest with its platforms and wheels narrowed to what is staged; all else word for word."""
     text = MANIFEST.read_text(encoding="utf-8")
     for key, values in (("platforms", platforms), ("wheels", [f"./wheels/{w.file_name}" for w in wheels])):
         start = text.index(f"\n{key} = [") + 1

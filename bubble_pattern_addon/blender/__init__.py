@@ -1,0 +1,19 @@
+"""Everything that touches Blender: mesh in and out, settings, operators, panels, preview, command line."""
+
+from __future__ import annotations
+
+from . import operators, panels, properties, versioning
+
+MODULES = (properties, operators, panels, versioning)
+
+
+def register() -> None:
+    """Register the parts, each after what it needs."""
+    for module in MODULES:
+        module.register()
+
+
+def unregister() -> None:
+    """Unregister them the other way round."""
+    for module in reversed(MODULES):
+        module.unregister()

@@ -1,0 +1,276 @@
+"""The sidebar, in the order of work; the large button is the next step."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from .properties import in_scene, is_outdated, is_pattern, pattern_of
+
+
+class SidebarPanel:
+    """Where all the panels stand."""
+
+    bl_space_type = 'VIEW_3D'
+    bl_region_type = 'UI'
+    bl_category = "Bubble Pattern"
+
+
+class SettingsPanel(SidebarPanel):
+    """A part of the settings, shown while a pattern is there to be edited."""
+
+    bl_parent_id = "BUBBLE_PATTERN_PT_main"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        obj = pattern_of(context.active_object)
+        return obj is not None and in_scene(obj.bubble_pattern.base) and not is_applied(obj)
+
+
+def is_applied(obj: bpy.types.Object) -> bool:
+    """Whether the part of the pattern `obj` stands in the place of its base."""
+    part = obj.bubble_pattern.part
+    return in_scene(part) and part.visible_get() and not obj.visible_get()
+
+
+def shown_settings(context: bpy.types.Context) -> Any:
+    """Settings of the pattern that the panels show, which poll has made sure of."""
+    obj = pattern_of(context.active_object)
+    assert obj is not None
+    return obj.bubble_pattern
+
+
+def columns(layout: bpy.types.UILayout) -> bpy.types.UILayout:
+    """A column of properties with their names on the left."""
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    return layout.column()
+
+
+def large(layout: bpy.types.UILayout) -> bpy.types.UILayout:
+    """A row for the button that is the next step."""
+    row = layout.row()
+    row.scale_y = 1.5
+    return row
+
+
+def sentences(layout: bpy.types.UILayout, text: str, width: int, icon: str) -> None:
+    """Text over as many lines as it needs in a sidebar `width` pixels wide."""
+    per_line = max(int(width / bpy.context.preferences.system.ui_scale / 7) - 6, 16)
+    lines: list[str] = [""]
+    for word in text.split():
+        if lines[-1] and len(lines[-1]) + len(word) >= per_line:
+            lines.append("")
+        lines[-1] = f"{lines[-1]} {word}".strip()
+    column = layout.column(align=True)
+    column.scale_y = 0.8
+    for number, line in enumerate(lines):
+        column.label(text=line, icon=icon if number == 0 else 'BLANK1')
+
+
+class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
+    """Region, and the buttons."""
+
+    bl_label = "Bubble Pattern"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, active = self.layout, context.active_object
+        obj = pattern_of(active)
+        if obj is None:
+            self.draw_start(context, layout)
+        elif not in_scene(obj.bubble_pattern.base):
+            sentences(layout, "The base of this pattern has been deleted", context.region.width, 'ERROR')
+            layout.operator("bubble_pattern.remove", icon='TRASH')
+        elif is_applied(obj):
+            self.draw_applied(context, layout, obj)
+        else:
+            self.draw_pattern(context, layout, obj)
+
+    def draw_start(self, context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
+        """Nothing is there yet: what to select, and the button."""
+        active = context.active_object
+        if active is None or active.type != 'MESH':
+            layout.label(text="Select a mesh object", icon='INFO')
+        elif context.mode == 'EDIT_MESH':
+            count = active.data.total_face_sel
+            text = (
+                f"{count:,} face{'s' if count != 1 else ''} selected" if count else "Select the faces to fill"
+            )
+            layout.label(text=text, icon='FACESEL')
+        else:
+            marked = "bubble_region" in active.data.attributes
+            layout.label(text="Region as marked" if marked else "Whole object", icon='OBJECT_DATA')
+        large(layout).operator("bubble_pattern.add", icon='ADD')
+
+    def draw_pattern(
+        self, context: bpy.types.Context, layout: bpy.types.UILayout, obj: bpy.types.Object
+    ) -> None:
+        """The pattern as it stands; its settings are in the panels below."""
+        settings = obj.bubble_pattern
+        columns(layout).prop(settings, "base")
+        if context.mode == 'EDIT_MESH':
+            row = layout.row(align=True)
+            row.operator("bubble_pattern.region_assign", text="Assign Region", icon='CHECKMARK')
+            if not is_pattern(context.active_object):
+                row.operator("bubble_pattern.add", text="", icon='ADD')
+        else:
+            layout.operator("bubble_pattern.region_edit", icon='FACESEL')
+        if settings.trouble:
+            sentences(layout, settings.trouble, context.region.width, 'ERROR')
+        outdated = bool(settings.trouble) or is_outdated(settings)
+        (large(layout) if outdated else layout.row()).operator(
+            "bubble_pattern.update", text="Update", icon='FILE_REFRESH', depress=outdated
+        )
+        (layout.row() if outdated else large(layout)).operator("bubble_pattern.apply", icon='CHECKMARK')
+        layout.operator("bubble_pattern.remove", icon='TRASH')
+
+    def draw_applied(
+        self, context: bpy.types.Context, layout: bpy.types.UILayout, obj: bpy.types.Object
+    ) -> None:
+        """The part as it stands."""
+        settings = obj.bubble_pattern
+        layout.label(text=settings.part.name, icon='MESH_DATA')
+        if settings.verdict:
+            sentences(layout, settings.verdict, context.region.width, 'ERROR')
+        else:
+            layout.label(text="Checked: a watertight solid", icon='CHECKMARK')
+        large(layout).operator("bubble_pattern.edit", icon='GREASEPENCIL')
+        layout.operator("bubble_pattern.remove", icon='TRASH')
+
+
+class BUBBLE_PATTERN_PT_packing(SettingsPanel, bpy.types.Panel):
+    """Step 1: where the features are."""
+
+    bl_label = "Packing"
+    bl_order = 1
+
+    def draw(self, context: bpy.types.Context) -> None:
+        settings = shown_settings(context)
+        column = columns(self.layout)
+        column.prop(settings, "pitch")
+        column.prop(settings, "edge_offset")
+        column.prop(settings, "seed")
+
+
+class BUBBLE_PATTERN_PT_solver(SettingsPanel, bpy.types.Panel):
+    """How step 1 is solved."""
+
+    bl_label = "Solver"
+    bl_parent_id = "BUBBLE_PATTERN_PT_packing"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        settings = shown_settings(context)
+        column = columns(self.layout)
+        column.prop(settings, "integrator")
+        column.prop(settings, "iterations")
+        column.prop(settings, "tolerance")
+
+
+class BUBBLE_PATTERN_PT_holes(SettingsPanel, bpy.types.Panel):
+    """Step 2: what the features are like."""
+
+    bl_label = "Holes"
+    bl_order = 2
+
+    def draw(self, context: bpy.types.Context) -> None:
+        settings = shown_settings(context)
+        column = columns(self.layout)
+        column.prop(settings, "diameter")
+        column.row().prop(settings, "depth_mode", expand=True)
+        if settings.depth_mode == 'BLIND':
+            column.prop(settings, "depth", text=" ")
+        column.prop(settings, "sides", text="Sides (0 = Auto)")
+        column.prop(settings, "wall_material")
+
+
+class BUBBLE_PATTERN_PT_limits(SettingsPanel, bpy.types.Panel):
+    """What must remain of the part."""
+
+    bl_label = "Limits"
+    bl_order = 3
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        settings = shown_settings(context)
+        column = columns(self.layout)
+        column.prop(settings, "min_web")
+        column.prop(settings, "min_margin")
+
+
+class BUBBLE_PATTERN_PT_preview(SettingsPanel, bpy.types.Panel):
+    """How the pattern is shown."""
+
+    bl_label = "Preview"
+    bl_order = 4
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        settings = shown_settings(context)
+        column = columns(self.layout)
+        column.prop(settings, "live")
+        column.prop(settings, "show_bubbles")
+
+
+class BUBBLE_PATTERN_PT_result(SettingsPanel, bpy.types.Panel):
+    """What came out."""
+
+    bl_label = "Result"
+    bl_order = 5
+
+    def draw(self, context: bpy.types.Context) -> None:
+        settings = shown_settings(context)
+        self.layout.active = not is_outdated(settings)
+        figures: list[tuple[str, str, bool]] = [("Features", f"{settings.count:,}", settings.count == 0)]
+        if settings.count > 1:
+            figures.append(("Smallest Web", length(context, settings.web), settings.web < settings.min_web))
+        if settings.margin >= 0:
+            margin = settings.margin
+            figures.append(("Smallest Margin", length(context, margin), margin < settings.min_margin))
+        figures.append(("Open Area", f"{settings.open_area:.1%}", False))
+        if settings.six >= 0:
+            figures.append(("Six Neighbors", f"{settings.six:.1%}", False))
+        if settings.gap_min >= 0:
+            figures.append(("Smallest Gap", f"{settings.gap_min:.2f} pitch", False))
+        for name, figure, alert in figures:
+            split = self.layout.split(factor=0.5)
+            left = split.row()
+            left.alignment = 'RIGHT'
+            left.label(text=name)
+            right = split.row()
+            right.alert = alert
+            right.label(text=figure)
+
+
+def length(context: bpy.types.Context, value: float) -> str:
+    """A length in the scene's unit."""
+    units = context.scene.unit_settings
+    return (
+        bpy.utils.units.to_string(units.system, 'LENGTH', value * units.scale_length, precision=4)
+        if (units.system != 'NONE')
+        else f"{value:.4g}"
+    )
+
+
+CLASSES: tuple[Any, ...] = (
+    BUBBLE_PATTERN_PT_main,
+    BUBBLE_PATTERN_PT_packing,
+    BUBBLE_PATTERN_PT_solver,
+    BUBBLE_PATTERN_PT_holes,
+    BUBBLE_PATTERN_PT_limits,
+    BUBBLE_PATTERN_PT_preview,
+    BUBBLE_PATTERN_PT_result,
+)
+
+
+def register() -> None:
+    """Make the panels known to Blender."""
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+
+
+def unregister() -> None:
+    """Take the panels back."""
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

@@ -1,0 +1,107 @@
+"""The pattern's object: a mesh of points that carry the features' attributes, and the way back."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ..core.mesh import Floats, Mesh
+from ..core.metric import Places
+from ..core.pattern import Pattern
+from .attributes import read_values, write_values
+from .reading import Base
+
+
+def new_pattern_object(base: bpy.types.Object) -> bpy.types.Object:
+    """An empty pattern object for `base`, in the base's collections and following it."""
+    mesh = bpy.data.meshes.new(f"{base.name} Pattern")
+    obj = bpy.data.objects.new(f"{base.name} Pattern", mesh)
+    for collection in base.users_collection:
+        collection.objects.link(obj)
+    obj.parent = base
+    return obj
+
+
+def write_pattern(obj: bpy.types.Object, pattern: Pattern, base_object: bpy.types.Object, base: Base) -> None:
+    """Fill the pattern object with the features of `pattern`, and set it in its frame on the base."""
+    mesh = obj.data
+    mesh.clear_geometry()
+    mesh.vertices.add(len(pattern))
+    write_values(mesh, "position", 'POINT', 'FLOAT_VECTOR', pattern.position)
+    write_values(mesh, "id", 'POINT', 'INT', np.arange(len(pattern)))
+    write_values(mesh, "diameter", 'POINT', 'FLOAT', pattern.diameter)
+    write_values(mesh, "pitch", 'POINT', 'FLOAT', pattern.pitch)
+    write_values(mesh, "row", 'POINT', 'INT', pattern.row)
+    write_values(mesh, "normal", 'POINT', 'FLOAT_VECTOR', pattern.normal)
+    write_values(mesh, "tangent", 'POINT', 'FLOAT_VECTOR', pattern.tangent)
+    write_values(mesh, "rotation", 'POINT', 'QUATERNION', rotations(pattern.normal, pattern.tangent))
+    write_values(mesh, "triangle", 'POINT', 'INT', pattern.places.triangle)
+    write_values(mesh, "barycentric", 'POINT', 'FLOAT_VECTOR', pattern.places.barycentric)
+    mesh.update()
+    obj.matrix_parent_inverse = base_object.matrix_world.inverted_safe()
+    obj.matrix_basis = Matrix(base.frame.tolist())
+    obj.update_tag()
+
+
+def write_diameters(obj: bpy.types.Object, diameter: Floats) -> None:
+    """Give the features of a pattern object these diameters (n,)."""
+    write_values(obj.data, "diameter", 'POINT', 'FLOAT', diameter)
+    obj.data.update_tag()
+
+
+def read_pattern(obj: bpy.types.Object, mesh: Mesh) -> Pattern:
+    """The pattern that the object's points carry, for the base geometry `mesh` it was made on.
+
+    Points that the user has deleted by hand are left out. Positions are taken from the places on the base,
+    which holds them on the surface to the last bit.
+    """
+    points = obj.data.attributes
+
+    def values(name: str, prop: str, dtype: type, width: int = 1) -> Floats:
+        return read_values(points[name].data, prop, dtype, width)
+
+    triangle = values("triangle", "value", np.int32).astype(np.int64)
+    barycentric = values("barycentric", "vector", np.float32, 3).astype(np.float64)
+    barycentric /= barycentric.sum(axis=1, keepdims=True)
+    position = (mesh.corners[triangle] * barycentric[:, :, None]).sum(axis=1)
+    return Pattern(
+        places=Places(position, triangle, barycentric),
+        normal=unit(values("normal", "vector", np.float32, 3).astype(np.float64)),
+        tangent=unit(values("tangent", "vector", np.float32, 3).astype(np.float64)),
+        pitch=values("pitch", "value", np.float32).astype(np.float64),
+        diameter=values("diameter", "value", np.float32).astype(np.float64),
+        row=values("row", "value", np.int32).astype(np.int64),
+    )
+
+
+def unit(vectors: Floats) -> Floats:
+    """(n, 3) vectors of length 1."""
+    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+
+
+def rotations(normal: Floats, tangent: Floats) -> Floats:
+    """(n, 4) quaternions w, x, y, z that turn Z to the normal and X to the tangent.
+
+    The four ways to take a quaternion out of a rotation matrix differ in which component they divide by; per
+    feature the largest one is used (S. W. Shepperd, Quaternion from rotation matrix, 1978).
+    """
+    x = tangent - normal * (tangent * normal).sum(axis=1, keepdims=True)
+    x = unit(x)
+    y = np.cross(normal, x)
+    m = np.stack([x, y, normal], axis=2)  # columns are the turned axes
+    xx, yy, zz = m[:, 0, 0], m[:, 1, 1], m[:, 2, 2]
+    a, b, c = m[:, 2, 1] - m[:, 1, 2], m[:, 0, 2] - m[:, 2, 0], m[:, 1, 0] - m[:, 0, 1]
+    d, e, f = m[:, 0, 1] + m[:, 1, 0], m[:, 0, 2] + m[:, 2, 0], m[:, 1, 2] + m[:, 2, 1]
+    ways = np.stack(
+        [
+            np.stack([1 + xx + yy + zz, a, b, c], axis=1),
+            np.stack([a, 1 + xx - yy - zz, d, e], axis=1),
+            np.stack([b, d, 1 - xx + yy - zz, f], axis=1),
+            np.stack([c, e, f, 1 - xx - yy + zz], axis=1),
+        ],
+        axis=1,
+    )
+    best = np.argmax(np.stack([xx + yy + zz, xx, yy, zz], axis=1), axis=1)
+    chosen = ways[np.arange(len(ways)), best]
+    return chosen / np.linalg.norm(chosen, axis=1, keepdims=True)
