@@ -17,9 +17,11 @@ import subprocess
 import sys
 from pathlib import Path
 
-import environment
-
 ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+
+from scripts import environment  # noqa: E402
+
 TIME_LIMIT = 20 * 60  # seconds; a Blender module that hangs at its exit must not hang its caller
 LINTERS = (["ruff", "format", "--check", "."], ["ruff", "check", "."], ["mypy"])
 
