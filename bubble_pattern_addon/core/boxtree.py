@@ -21,7 +21,7 @@ Overlap = Callable[[Ints, Floats, Floats], Bools]
 @dataclass(frozen=True)
 class BoxTree:
     """order: (T,) triangles along the curve; middle, half: per level, from single triangles up to one box,
-    (m, 3).
+    (3, m).
     """
 
     order: Ints
@@ -33,16 +33,17 @@ def build_tree(corners: Floats) -> BoxTree:
     """Tree over triangles given by their `corners`, (T, 3, 3), T at least 1."""
     low, high = corners.min(axis=1), corners.max(axis=1)
     order = np.argsort(_morton(low + high), kind="stable")
-    low, high = low[order], high[order]
+    # an axis per row: queries look at one axis after the other
+    low, high = low[order].T.copy(), high[order].T.copy()
     middle, half = [], []
     while True:
         middle.append((low + high) / 2)
         # rounding of the middle must not shrink a box
         half.append(np.maximum(high - middle[-1], middle[-1] - low) * (1 + 1e-15))
-        if len(low) == 1:
+        if low.shape[1] == 1:
             return BoxTree(order, tuple(middle), tuple(half))
-        starts = np.arange(0, len(low), 2)
-        low, high = np.minimum.reduceat(low, starts), np.maximum.reduceat(high, starts)
+        starts = np.arange(0, low.shape[1], 2)
+        low, high = np.minimum.reduceat(low, starts, axis=1), np.maximum.reduceat(high, starts, axis=1)
 
 
 def meeting(tree: BoxTree, questions: int, overlap: Overlap) -> tuple[Ints, Ints]:
@@ -52,11 +53,11 @@ def meeting(tree: BoxTree, questions: int, overlap: Overlap) -> tuple[Ints, Ints
     asked = np.arange(questions)
     box = np.zeros(questions, dtype=np.int64)
     for level in range(len(tree.middle) - 1, -1, -1):
-        passed = overlap(asked, tree.middle[level][box], tree.half[level][box])
+        passed = overlap(asked, tree.middle[level][:, box].T, tree.half[level][:, box].T)
         asked, box = asked[passed], box[passed]
         if level:
             asked, box = np.repeat(asked, 2), np.stack([2 * box, 2 * box + 1], axis=1).ravel()
-            there = box < len(tree.middle[level - 1])
+            there = box < tree.middle[level - 1].shape[1]
             asked, box = asked[there], box[there]
     triangle = tree.order[box]
     by_question = np.lexsort((triangle, asked))
@@ -76,11 +77,11 @@ def meeting_cylinders(tree: BoxTree, start: Floats, end: Floats, radius: Floats)
     def overlap(which: Ints, middle: Floats, half: Floats) -> Bools:
         offset = middle - centre[which]
         direction = along[which]
-        close = np.all(np.abs(offset) <= reach[which] + half, axis=1)
+        apart = np.abs(offset) > reach[which] + half
         height = np.einsum("ij,ij->i", offset, direction)
         aside = np.einsum("ij,ij->i", offset, offset) - height**2
         sphere = radius[which] + np.sqrt(np.einsum("ij,ij->i", half, half))
-        return close & (aside <= sphere**2 * (1 + 1e-9))
+        return ~(apart[:, 0] | apart[:, 1] | apart[:, 2]) & (aside <= sphere**2 * (1 + 1e-9))
 
     return meeting(tree, len(start), overlap)
 

@@ -6,47 +6,24 @@ from dataclasses import dataclass
 
 import manifold3d
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
+from . import carry
 from .boxtree import build_tree
+from .check import Check, check_part
+from .closed import patch_euler
+from .collision import colliding
 from .errors import BaseError, RecipeError
 from .feature import Cutters, make_cutters
 from .mesh import Bools, Floats, Ints, Mesh
 from .pattern import Pattern
 from .progress import Progress, Steps
 from .recipe import Feature
-from .soundness import SoundBase, edge_keys, signed_volumes, sound_base
+from .soundness import SoundBase, sound_base
+from .splitting import split_crowded
 from .wall import DEEPEST, Fault, NearWall, near_wall
 
-
-@dataclass(frozen=True)
-class Check:
-    """Measured on the part, never assumed.
-
-    watertight: every edge is shared by exactly two faces, in opposite directions
-    euler, base_euler: V - E + F of the part and of the base; every through-hole takes two
-    genus: handles of the part, all shells together
-    bodies, base_bodies: closed shells around material; cavities: shells around enclosed hollows
-    volume, base_volume, removed_volume: in cubic units
-    through: holes that pierce their wall
-    unchanged: every face of the base that no feature touches came out as it went in
-    problems: one sentence each; empty when the part is good
-    """
-
-    watertight: bool
-    euler: int
-    base_euler: int
-    genus: int
-    bodies: int
-    base_bodies: int
-    cavities: int
-    volume: float
-    base_volume: float
-    removed_volume: float
-    through: int
-    unchanged: bool
-    problems: tuple[str, ...]
+SAID = 3
+"""Features that could not be added and are named in the check's problems; the part lists them all."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +33,8 @@ class Part:
     mesh: the part; source: (T',) triangle of the base each of its triangles lies on, -1 - feature id on a
         feature's wall
     vertex: (V',) vertex of the base at exactly this place, -1 for a vertex the cut made
-    untouched: (T',) triangles that are triangles of the base as they were, corner for corner
+    untouched: (T',) triangles that are triangles of the base as they were: their corners are the corners of
+        their source, in the same order
     thickness: (n,) thickness of the near wall along each feature's axis, nan where no far side was found
     pierced: (n,) the feature goes through the near wall (False for a blind hole)
     failures: (feature id, sentence) for every feature that was not added
@@ -78,10 +56,20 @@ class Plan:
     cutters.
     """
 
+    pattern: Pattern
     sound: SoundBase
     wall: NearWall
     fault: Ints
+    top: Floats
+    bottom: Floats
     cutters: Cutters
+
+    @property
+    def meets(self) -> Bools:
+        """Which of the triangles seen by the walls a cutter reaches, (k,)."""
+        wall, feature = self.wall, self.wall.seen_feature
+        within = (wall.seen_low <= self.top[feature]) & (wall.seen_high >= -self.bottom[feature])
+        return within & (self.fault[feature] == Fault.NONE)
 
 
 def part_steps(base: Mesh, pattern: Pattern, feature: Feature) -> Steps[Part]:
@@ -93,9 +81,9 @@ def part_steps(base: Mesh, pattern: Pattern, feature: Feature) -> Steps[Part]:
     """
     plan = yield from plan_steps(base, pattern, feature)
     yield Progress("Cutting", 0.3)
-    mesh, raw = subtract(plan.sound.mesh, plan.cutters)
+    mesh, facet = cut(plan)
     yield Progress("Checking", 0.8)
-    part = _judge(base, pattern, feature, plan, mesh, raw)
+    part = _judge(base, feature, plan, mesh, facet)
     yield Progress("Checking", 1.0)
     return part
 
@@ -113,29 +101,40 @@ def plan_steps(base: Mesh, pattern: Pattern, feature: Feature) -> Steps[Plan]:
     if feature.depth is not None:
         deepest = np.maximum(deepest, 2 * feature.depth)
     wall = near_wall(sound.mesh, build_tree(sound.mesh.corners), pattern, deepest)
-    fault = wall.fault.copy()
-    bottom = wall.bottom
+    fault, bottom = wall.fault.copy(), -wall.bottom
     if feature.depth is not None:
         bottom = np.full(len(pattern), feature.depth)
         fault[(fault == Fault.THICK) | (fault == Fault.CROWDED)] = Fault.NONE
-        fault[(wall.near_far >= -feature.depth * (1 + 1e-9)) & (fault == Fault.NONE)] = Fault.BREAKS
-    else:
-        bottom = -bottom
+        fault[(wall.far_high >= -feature.depth * (1 + 1e-9)) & (fault == Fault.NONE)] = Fault.BREAKS
+    fault[colliding(pattern, np.flatnonzero(fault == Fault.NONE), wall.top, bottom)] = Fault.MEETS
     yield Progress("Shaping cutters", 0.2)
     chosen = np.flatnonzero(fault == Fault.NONE)
-    return Plan(sound, wall, fault, make_cutters(pattern, feature, chosen, wall.top[chosen], bottom[chosen]))
+    cutters = make_cutters(pattern, feature, chosen, wall.top[chosen], bottom[chosen])
+    return Plan(pattern, sound, wall, fault, wall.top, bottom, cutters)
 
 
-def subtract(base: Mesh, cutters: Cutters) -> tuple[Mesh, Ints]:
-    """`base` less `cutters`, one boolean: the result and the facet each triangle lies on, (T',).
+def cut(plan: Plan) -> tuple[Mesh, Ints]:
+    """The boolean of `plan` on its base, split where many holes crowd one face: see `subtract`."""
+    wall, base = plan.wall, plan.sound.mesh
+    through = np.flatnonzero(plan.meets & np.isfinite(wall.seen_axis))
+    feature = wall.seen_feature[through]
+    pattern = plan.pattern
+    place = pattern.position[feature] + wall.seen_axis[through, None] * pattern.normal[feature]
+    split, piece = split_crowded(base, wall.seen_triangle[through], place, pattern.diameter[feature] / 2)
+    return subtract(split, piece, plan.cutters)
 
-    Facets: the base's triangle, or -1 - a facet of the cutters. Faces keep their identity through the
+
+def subtract(base: Mesh, face: Ints, cutters: Cutters) -> tuple[Mesh, Ints]:
+    """`base`, whose triangles belong to the faces `face`, (T,), less `cutters`, in one boolean.
+
+    Returns the result and the facet each of its triangles lies on, (T',): a face of the base, or -1 - a
+    facet of the cutters. Faces keep their identity through the
     boolean, which also keeps it from merging any of the base's own edges, however flat.
     """
     if len(cutters.facet) == 0:
-        return base, np.arange(len(base.triangles))
+        return base, face
     first = manifold3d.Manifold.reserve_ids(2)
-    solid = _manifold(base, np.arange(len(base.triangles)), first)
+    solid = _manifold(base, face, first)
     tool = _manifold(cutters.mesh, cutters.facet, first + 1)
     result = solid - tool
     if result.status() != manifold3d.Error.NoError:
@@ -166,58 +165,48 @@ def _manifold(mesh: Mesh, facet: Ints, name: int) -> manifold3d.Manifold:
     return solid
 
 
-def _judge(base: Mesh, pattern: Pattern, feature: Feature, plan: Plan, mesh: Mesh, facet: Ints) -> Part:
+def _judge(base: Mesh, feature: Feature, plan: Plan, mesh: Mesh, facet: Ints) -> Part:
     """The Part from the boolean's result: where its faces come from, and what can be measured on it."""
     sound, cutters = plan.sound, plan.cutters
-    wall_face = facet < 0
-    source = np.where(wall_face, 0, sound.triangle[np.where(wall_face, 0, facet)])
-    if len(cutters.feature):
-        source[wall_face] = -1 - cutters.feature[-1 - facet[wall_face]]
-    vertex = _match_vertices(sound, mesh)
-    untouched = _untouched(base, sound, facet, vertex[mesh.triangles])
-    cut = np.zeros(len(pattern), dtype=bool)
-    cut[cutters.feature] = True
-    capped = np.zeros(len(pattern), dtype=bool)
-    ends = (
-        cutters.feature[-1 - facet[wall_face]][cutters.cap[-1 - facet[wall_face]] != 0] if cut.any() else []
-    )
-    capped[ends] = True
-    pierced = cut & ~capped if feature.depth is None else np.zeros(len(pattern), dtype=bool)
-    failures = _failures(pattern, feature, plan)
-    check = _check(plan, feature, mesh, pierced, cut, untouched, facet, failures)
-    return Part(mesh, source, vertex, untouched, plan.wall.thickness, pierced, failures, check)
+    known = carry.same_places(sound.mesh.vertices, sound.mesh.vertices)
+    named = carry.same_places(mesh.vertices, sound.mesh.vertices)
+    whole, turn = carry.whole_faces(named[mesh.triangles], facet, known[sound.mesh.triangles])
+    mesh = Mesh(mesh.vertices, np.take_along_axis(mesh.triangles, turn, axis=1))
+    on_base = facet >= 0
+    source = np.empty(len(facet), dtype=np.int64)
+    source[on_base] = sound.triangle[facet[on_base]]
+    source[~on_base] = -1 - cutters.feature[-1 - facet[~on_base]]
+    vertex = np.where(named >= 0, sound.vertex[named], -1)
+
+    reached = np.zeros(len(sound.mesh.triangles), dtype=bool)
+    reached[plan.wall.seen_triangle[plan.meets]] = True
+    reached[facet[whole]] = True
+    shape = _wall_shapes(plan, mesh, facet)
+    cut = plan.fault == Fault.NONE
+    pierced = cut & (shape == 0)
+    failures = _failures(plan)
+    problems = [text for _, text in failures[:SAID]]
+    if len(failures) > SAID:
+        problems.append(f"{len(failures) - SAID:,} more holes were not cut, for the like reasons.")
+    torn = np.flatnonzero(cut & (shape != (0 if feature.depth is None else 1)))
+    if len(torn):
+        state = "do not pierce one wall cleanly" if feature.depth is None else "have no clean floor and wall"
+        problems.append(f"{len(torn):,} holes {state}, the first is {_place(plan.pattern, int(torn[0]))}.")
+    check = check_part(mesh, sound.mesh, int(pierced.sum()), bool(reached.all()), problems)
+    return Part(mesh, source, vertex, whole, plan.wall.thickness, pierced, failures, check)
 
 
-def _match_vertices(sound: SoundBase, mesh: Mesh) -> Ints:
-    """Caller's vertex at exactly each vertex of `mesh`, -1 where there is none, (V',)."""
-    own = sound.mesh.vertices
-    keys = _place_keys(own)
-    order = np.argsort(keys, kind="stable")
-    asked = _place_keys(mesh.vertices)
-    nearest = order[np.minimum(np.searchsorted(keys[order], asked), len(own) - 1)]
-    same = np.all(own[nearest] == mesh.vertices, axis=1)
-    return np.where(same, sound.vertex[nearest], -1)
-
-
-def _place_keys(points: Floats) -> np.ndarray:
-    """A number per place, equal for equal places, (n,) uint64; adding 0 makes -0 and 0 the same place."""
-    bits = (points + 0.0).view(np.uint64)
-    return (
-        bits[:, 0] * np.uint64(0x9E3779B97F4A7C15)
-        + (bits[:, 1] ^ (bits[:, 1] >> np.uint64(29))) * np.uint64(0xBF58476D1CE4E5B9)
-        + (bits[:, 2] ^ (bits[:, 2] >> np.uint64(31))) * np.uint64(0x94D049BB133111EB)
-    )
-
-
-def _untouched(base: Mesh, sound: SoundBase, facet: Ints, corners: Ints) -> Bools:
-    """Triangles of the result, (T',), that are a whole triangle of the base with the same three corners."""
-    pieces = np.bincount(facet[facet >= 0], minlength=len(sound.triangle))
-    candidate = np.flatnonzero((facet >= 0) & np.all(corners >= 0, axis=1))
-    candidate = candidate[pieces[facet[candidate]] == 1]
-    before = sound.vertex[sound.mesh.triangles[facet[candidate]]]
-    same = np.zeros(len(facet), dtype=bool)
-    same[candidate] = np.all(np.sort(before, axis=1) == np.sort(corners[candidate], axis=1), axis=1)
-    return same
+def _wall_shapes(plan: Plan, mesh: Mesh, facet: Ints) -> Floats:
+    """Euler characteristic of each feature's wall and floor in the result, (n,): 0 a ring, as of a
+    through-hole; 1 a cup, as of a blind one; -1 for a feature without any.
+    """
+    made = facet < 0
+    owner = np.full(len(facet), -1)
+    owner[made] = plan.cutters.feature[-1 - facet[made]]
+    count = len(plan.pattern)
+    shape = patch_euler(mesh.triangles, owner, count)
+    shape[np.bincount(owner[made], minlength=count) == 0] = -1
+    return shape
 
 
 _REASONS = {
@@ -230,116 +219,20 @@ _REASONS = {
 }
 
 
-def _failures(pattern: Pattern, feature: Feature, plan: Plan) -> tuple[tuple[int, str], ...]:
+def _failures(plan: Plan) -> tuple[tuple[int, str], ...]:
     """A sentence for every feature that was not cut."""
     return tuple(
-        (int(which), f"Hole {which} at ({x:.4g}, {y:.4g}, {z:.4g}) {_REASONS[Fault(plan.fault[which])]}.")
+        (int(which), f"{_place(plan.pattern, which).capitalize()} {_REASONS[Fault(plan.fault[which])]}.")
         for which in np.flatnonzero(plan.fault)
-        for x, y, z in [pattern.position[which]]
     )
 
 
-def is_watertight(triangles: Ints) -> bool:
-    """Is every edge shared by exactly two triangles, in opposite directions?"""
-    keys = np.sort(edge_keys(triangles)[0])
-    first, second = keys[::2], keys[1::2]
-    return (
-        len(keys) % 2 == 0
-        and bool(np.all(second == first + 1))
-        and bool(np.all(first % 2 == 0))
-        and bool(np.all(second[:-1] < first[1:]))
-    )
-
-
-def euler_number(triangles: Ints) -> int:
-    """V - E + F of a closed surface, whose edges are 3/2 of its faces."""
-    used = np.zeros(int(triangles.max()) + 1 if len(triangles) else 0, dtype=bool)
-    used[triangles] = True
-    return int(used.sum()) - len(triangles) * 3 // 2 + len(triangles)
-
-
-def shell_volumes(mesh: Mesh) -> Floats:
-    """Signed volume of every connected shell, (shells,); a cavity's is negative."""
-    start, end = mesh.triangles[:, 0], mesh.triangles[:, 1]
-    number = len(mesh.vertices)
-    graph = coo_array(
-        (
-            np.ones(len(start) * 2, dtype=np.int8),
-            (np.concatenate([start, start]), np.concatenate([end, mesh.triangles[:, 2]])),
-        ),
-        (number, number),
-    )
-    label = connected_components(graph, directed=False)[1][start]
-    volumes = np.bincount(label, weights=signed_volumes(mesh))
-    return volumes[np.bincount(label) > 0]
-
-
-def _check(
-    plan: Plan,
-    feature: Feature,
-    mesh: Mesh,
-    pierced: Bools,
-    cut: Bools,
-    untouched: Bools,
-    facet: Ints,
-    failures: tuple[tuple[int, str], ...],
-) -> Check:
-    """Measure the result and say what is wrong with it."""
-    base = plan.sound.mesh
-    before, after = shell_volumes(base), shell_volumes(mesh)
-    euler, base_euler = euler_number(mesh.triangles), euler_number(base.triangles)
-    volume, base_volume = float(after.sum()), float(before.sum())
-    unchanged = True
-    problems = [text for _, text in failures[:3]]
-    if len(failures) > 3:
-        problems.append(f"{len(failures) - 3:,} more holes were not cut.")
-    watertight = is_watertight(mesh.triangles)
-    if not watertight:
-        problems.append("The part is not watertight.")
-    expected = base_euler - 2 * int(pierced.sum())
-    if euler != expected:
-        problems.append(f"The part's Euler characteristic is {euler}, it should be {expected}.")
-    bodies, base_bodies = int((after > 0).sum()), int((before > 0).sum())
-    if bodies > base_bodies:
-        problems.append(f"{bodies - base_bodies} loose pieces were cut off the part.")
-    return Check(
-        watertight,
-        euler,
-        base_euler,
-        len(after) - euler // 2,
-        bodies,
-        base_bodies,
-        int((after < 0).sum()),
-        volume,
-        base_volume,
-        base_volume - volume,
-        int(pierced.sum()),
-        unchanged,
-        tuple(problems),
-    )
+def _place(pattern: Pattern, which: int) -> str:
+    return "hole {} at ({:.4g}, {:.4g}, {:.4g})".format(which, *pattern.position[which])
 
 
 def carry_corners(base: Mesh, part: Part, values: Floats) -> Floats:
-    """Corner values of the base carried to the part: (T, 3, k) -> (T', 3, k), linear on every base triangle.
-
-    Zero on the walls of features, which lie on no triangle of the base. Corners that are corners of the base
-    keep their value bit for bit.
+    """Values on the corners of the base carried to the part: (T, 3, k) -> (T', 3, k); see
+    `carry.carry_corners`.
     """
-    carried = np.zeros((len(part.source), 3, values.shape[2]), dtype=values.dtype)
-    on_base = np.flatnonzero(part.source >= 0)
-    source = part.source[on_base]
-    a, b, c = base.corners[source].swapaxes(0, 1)
-    plane = np.cross(b - a, c - a)
-    size = np.einsum("ij,ij->i", plane, plane)
-    offset = part.mesh.corners[on_base] - a[:, None]
-    share = np.empty((len(on_base), 3, 3))
-    for corner in range(3):
-        share[:, corner, 1] = np.einsum("ij,ij->i", np.cross(offset[:, corner], c - a), plane)
-        share[:, corner, 2] = np.einsum("ij,ij->i", np.cross(b - a, offset[:, corner]), plane)
-    share[..., 1:] /= np.where(size > 0, size, 1)[:, None, None]
-    share[..., 0] = 1 - share[..., 1] - share[..., 2]
-    match = part.vertex[part.mesh.triangles[on_base]][:, :, None] == base.triangles[source][:, None]
-    known = match.any(axis=2)
-    share[known] = match[known]
-    carried[on_base] = np.einsum("tij,tjk->tik", share, values[source])
-    return carried
+    return carry.carry_corners(base, part.mesh, part.source, values)

@@ -11,6 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .boxtree import build_tree
+from .closed import edge_keys, fans, is_closed, shells, signed_volumes
+from .crossings import crossing_triangles
 from .errors import BaseError
 from .mesh import Floats, Ints, Mesh
 
@@ -32,16 +35,40 @@ def sound_base(base: Mesh) -> SoundBase:
     """`base` made ready for a boolean.
 
     Raises BaseError, one sentence that says what is wrong, where, and what to do: no faces, coordinates that
-    are no numbers, no area, open or non-manifold edges, inconsistent winding, inside out.
+    are no numbers, no area, open or non-manifold edges, inconsistent winding, inside out, one body inside
+    another, faces that reach through one another.
     """
     _check_numbers(base)
     # bodies that touch along an edge are closed as indexed, and would not be after welding
     sound = _without_collapsed(base, np.arange(len(base.vertices)))
-    if not _is_closed(sound.mesh.triangles):
+    if not is_closed(sound.mesh.triangles):
         sound = _without_collapsed(base, weld(base.vertices))
         _check_edges(sound.mesh)
-    _check_volume(sound.mesh)
+    sound = _without_pinches(sound)
+    _check_orientation(sound.mesh)
+    crossing = crossing_triangles(sound.mesh, build_tree(sound.mesh.corners))
+    if len(crossing):
+        faces = np.unique(crossing)
+        place = _where(sound.mesh.corners[crossing[:, 0]].mean(axis=1))
+        raise BaseError(
+            f"The base passes through itself: {len(faces):,} faces reach through one another, {place}. "
+            "Unite the overlapping parts first."
+        )
     return sound
+
+
+def _without_pinches(sound: SoundBase) -> SoundBase:
+    """Where the surface touches itself in a vertex, a vertex for each side: handles and bodies count right
+    then.
+    """
+    fan = fans(sound.mesh.triangles)
+    if fan.max() + 1 == len(sound.mesh.vertices):
+        return sound
+    vertex = np.empty(fan.max() + 1, dtype=np.int64)
+    vertex[fan] = sound.mesh.triangles
+    return SoundBase(
+        Mesh(sound.mesh.vertices[vertex], fan.astype(np.int64)), sound.triangle, sound.vertex[vertex]
+    )
 
 
 def weld(vertices: Floats) -> Ints:
@@ -84,81 +111,92 @@ def _check_numbers(base: Mesh) -> None:
         raise BaseError("Every face of the base has zero area: choose a mesh that encloses a volume.")
 
 
-def edge_keys(triangles: Ints) -> tuple[Ints, Ints]:
-    """Directed edges of `triangles`, (T, 3), each as one number: 2 * (edge) + direction, and the vertex
-    count V.
-
-    The edge between vertices i < j is i * V + j; direction 1 runs from j to i. (3 T,), and V as a 0-d array.
-    """
-    start, end = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
-    number = np.asarray(triangles.max() + 1 if len(triangles) else 0)
-    return (np.minimum(start, end) * number + np.maximum(start, end)) * 2 + (start > end), number
-
-
-def _is_closed(triangles: Ints) -> bool:
-    """Is every edge shared by exactly two triangles that run along it in opposite directions?"""
-    if len(triangles) == 0 or len(triangles) % 2:
-        return False
-    keys = np.sort(edge_keys(triangles)[0])
-    first, second = keys[::2], keys[1::2]
-    return bool(np.all(second == first + 1) and np.all(first % 2 == 0) and np.all(second[:-1] < first[1:]))
-
-
 def _check_edges(mesh: Mesh) -> None:
     """Raise BaseError where the surface is not closed and consistently wound."""
-    if _is_closed(mesh.triangles):
+    if is_closed(mesh.triangles):
         return
     keys, number = edge_keys(mesh.triangles)
     edges, inverse = np.unique(keys // 2, return_inverse=True)
     faces = np.bincount(inverse, minlength=len(edges))
     backward = np.bincount(inverse, weights=keys % 2, minlength=len(edges))
-    ends = np.stack(np.divmod(edges, number), axis=1)
+    middle = mesh.vertices[np.stack(np.divmod(edges, number), axis=1)].mean(axis=1)
+    found = [
+        f"{_count(int(wrong.sum()), 'edge', 'edges')} {text}, {_where(middle[wrong])}"
+        for wrong, text in (
+            (faces == 1, "with a face on one side only"),
+            (faces > 2, "shared by more than two faces"),
+            ((faces == 2) & (backward != 1), "between a face turned outward and one turned inward"),
+        )
+        if wrong.any()
+    ]
+    remedy = "close the holes" if (faces == 1).any() else "separate or remove the extra faces"
+    if not (faces != 2).any():
+        remedy = "recalculate the normals"
+    raise BaseError(f"The base is not a closed solid: {'; '.join(found)}. To make a part, {remedy} first.")
+
+
+def _check_orientation(mesh: Mesh) -> None:
+    """Raise BaseError for shells that enclose nothing, are inside out, or lie inside another body's material.
+
+    A shell round material must lie outside every other body (or in a hollow), a hollow's shell inside one.
+    """
+    shell = shells(mesh)
+    volume = np.bincount(shell, weights=signed_volumes(mesh))
+    area = np.bincount(shell, weights=np.linalg.norm(mesh.area_vectors, axis=1))
+    empty = np.flatnonzero(np.abs(volume) <= 1e-12 * area**1.5)
+    first = np.unique(shell, return_index=True)[1]
+    probe = mesh.vertices[mesh.triangles[first, 0]]
+    inside = _depth(mesh, shell, probe)
     for wrong, text in (
+        (empty, "encloses no volume, {}: choose a closed part with some thickness"),
         (
-            faces > 2,
-            "The base is not manifold: {} shared by more than two faces, {}. "
-            "Separate the parts there or remove inner faces.",
+            np.flatnonzero((volume < 0) & (inside < 1)),
+            "is inside out (its faces point inward), {}: flip its normals",
         ),
         (
-            faces == 1,
-            "The base is open: {} with a face on one side only, {}. "
-            "Close the holes first; a preview works without.",
-        ),
-        (
-            (faces == 2) & (backward != 1),
-            "The base's faces point different ways: {} between a face turned outward and one turned inward, "
-            "{}. Recalculate the normals.",
+            np.flatnonzero((volume > 0) & (inside > 0)),
+            "has a body inside another body, {}: unite or remove it",
         ),
     ):
-        where = np.flatnonzero(wrong)
-        if len(where):
-            middle = mesh.vertices[ends[where]].mean(axis=1)
-            raise BaseError(text.format(_count(len(where), "edge", "edges"), _spread_text(middle)))
-    raise BaseError("The base's surface is not closed: repair the mesh first.")
+        if len(wrong):
+            raise BaseError(f"The base {text.format(_where(probe[wrong]))}.")
 
 
-def _check_volume(mesh: Mesh) -> None:
-    volume = signed_volumes(mesh).sum()
-    if volume < 0:
-        raise BaseError("The base is inside out (its faces point inward): flip its normals.")
-    if volume == 0:
-        raise BaseError("The base encloses no volume: choose a closed part with some thickness.")
+def _depth(mesh: Mesh, shell: Ints, probe: Floats) -> Ints:
+    """How many times the other shells wind round each shell's `probe` point, (shells,).
 
-
-def signed_volumes(mesh: Mesh) -> Floats:
-    """Volume of the tetrahedron under each triangle, seen from the middle of the mesh, (T,); their sum is
-    the volume.
+    The solid angle of a triangle after A. van Oosterom and J. Strackee, The solid angle of a plane triangle,
+    1983.
     """
-    middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
-    a, b, c = (mesh.vertices - middle)[mesh.triangles].swapaxes(0, 1)
-    return np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
+    depth = np.zeros(len(probe), dtype=np.int64)
+    if len(probe) == 1:
+        return depth
+    low = np.full((len(probe), 3), np.inf)
+    high = -low
+    np.minimum.at(low, shell, mesh.corners.min(axis=1))
+    np.maximum.at(high, shell, mesh.corners.max(axis=1))
+    for which, point in enumerate(probe):
+        around = np.all((low <= point) & (high >= point), axis=1)
+        around[which] = False
+        if not around.any():
+            continue
+        a, b, c = (mesh.corners[around[shell]] - point).swapaxes(0, 1)
+        la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
+        above = np.einsum("ij,ij->i", a, np.cross(b, c))
+        below = la * lb * lc + _dot(a, b) * lc + _dot(b, c) * la + _dot(c, a) * lb
+        depth[which] = round(float(np.arctan2(above, below).sum()) / (2 * np.pi))
+    return depth
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    return np.einsum("ij,ij->i", a, b)
 
 
 def _count(number: int, one: str, many: str) -> str:
     return f"{number:,} {one if number == 1 else many}"
 
 
-def _spread_text(points: Floats) -> str:
+def _where(points: Floats) -> str:
     """Where `points`, (n, 3), are, in words."""
     first = points[np.lexsort(points.T)[0]]
     place = "({:.4g}, {:.4g}, {:.4g})".format(*first)

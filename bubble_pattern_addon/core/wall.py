@@ -48,23 +48,27 @@ class NearWall:
 
     thickness: of the wall along the axis; nan where no far side was found
     top: where a cutter starts, clear of the surface and of what hangs above it
-    far: lowest point of the wall's far side under the disc; nan where none was found
-    near_far: highest point of that far side
+    far_low: lowest point of the wall's far side under the disc; nan where none was found
+    far_high: highest point of that far side
     bottom: where a through cutter ends, clear of the far side and of the next wall
     fault: Fault of a through-hole there
-    axis_feature, axis_triangle, axis_height: (k,) every crossing of a feature's axis with a triangle of the
-        base
+    seen_feature, seen_triangle, seen_low, seen_high: (k,) every triangle with a part inside a feature's
+        cylinder
+        and the heights of that part
+    seen_axis: (k,) height at which the feature's axis crosses that triangle, nan where it does not
     """
 
     thickness: Floats
     top: Floats
-    far: Floats
-    near_far: Floats
+    far_low: Floats
+    far_high: Floats
     bottom: Floats
     fault: Ints
-    axis_feature: Ints
-    axis_triangle: Ints
-    axis_height: Floats
+    seen_feature: Ints
+    seen_triangle: Ints
+    seen_low: Floats
+    seen_high: Floats
+    seen_axis: Floats
 
 
 def near_wall(base: Mesh, tree: BoxTree, pattern: Pattern, deepest: Floats) -> NearWall:
@@ -113,9 +117,8 @@ def _look(base: Mesh, tree: BoxTree, pattern: Pattern, ids: Ints, deepest: Float
     fault[~np.isfinite(thickness) | (-far_low > deepest)] = Fault.THICK
     fault[(surface_high > STEEPEST * radius) | (surface_low < -STEEPEST * radius)] = Fault.FOLDED
     fault[~on_base] = Fault.OFF
-    crosses = np.isfinite(spans.axis)
-    crossing = (ids[owner[crosses]], triangle[crosses], spans.axis[crosses])
-    return (thickness, top, far_low, far_high, bottom, fault, *crossing)
+    seen = (ids[owner], triangle, spans.low, spans.high, spans.axis)
+    return (thickness, top, far_low, far_high, bottom, fault, *seen)
 
 
 def _local(base: Mesh, pattern: Pattern, ids: Ints, owner: Ints, triangle: Ints) -> Floats:

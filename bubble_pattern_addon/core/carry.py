@@ -1,0 +1,85 @@
+"""What of the base is found again in the part, and how values on the base's corners come along."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .mesh import Bools, Floats, Ints, Mesh
+
+
+def same_places(points: Floats, known: Floats) -> Ints:
+    """Row of `known`, (m, 3), at exactly each of `points`, (n, 3); -1 where there is none, (n,).
+
+    Of several known rows at one place always the same one is taken.
+    """
+    keys = _place_keys(known)
+    order = np.argsort(keys, kind="stable")
+    row = order[np.minimum(np.searchsorted(keys[order], _place_keys(points)), len(known) - 1)]
+    there = known[row] == points
+    return np.where(there[:, 0] & there[:, 1] & there[:, 2], row, -1)
+
+
+def _place_keys(points: Floats) -> np.ndarray:
+    """A number per place, equal for equal places, (n,) uint64; adding 0 makes -0 and 0 the same place."""
+    bits = (points + 0.0).view(np.uint64)
+    return (
+        bits[:, 0] * np.uint64(0x9E3779B97F4A7C15)
+        + (bits[:, 1] ^ (bits[:, 1] >> np.uint64(29))) * np.uint64(0xBF58476D1CE4E5B9)
+        + (bits[:, 2] ^ (bits[:, 2] >> np.uint64(31))) * np.uint64(0x94D049BB133111EB)
+    )
+
+
+def whole_faces(triangles: Ints, face: Ints, base: Ints) -> tuple[Bools, Ints]:
+    """Which `triangles` of a part, (T', 3), are whole triangles of `base`, (T, 3), and the part's triangles
+    again with the corners of those in the base's order.
+
+    face: (T',) triangle of the base each lies on, below 0 for none. Corners are compared by their index, so
+    those of the part must be named like the base's, below 0 for new ones.
+    """
+    pieces = np.bincount(face[face >= 0], minlength=len(base))
+    alone = np.flatnonzero(face >= 0)
+    alone = alone[pieces[face[alone]] == 1]
+    whole, turned = np.zeros(len(face), dtype=bool), np.zeros(len(face), dtype=np.int64)
+    for turn in range(3):
+        same = np.roll(triangles[alone], -turn, axis=1) == base[face[alone]]
+        match = alone[same[:, 0] & same[:, 1] & same[:, 2]]
+        whole[match], turned[match] = True, turn
+    return whole, (np.arange(3) + turned[:, None]) % 3
+
+
+def carry_corners(base: Mesh, part: Mesh, source: Ints, values: Floats) -> Floats:
+    """Values on the corners of the base carried to the part: (T, 3, k) -> (T', 3, k), linear on each base
+    triangle.
+
+    source: (T',) triangle of the base that each triangle of the part lies on, below 0 for none: there the
+    values are 0, as on the walls of features. A corner at exactly the place of a corner of its base triangle
+    keeps its value bit for bit. On a base triangle without area the nearest corner's value is taken.
+    """
+    carried = np.zeros((len(source), 3, values.shape[2]), dtype=values.dtype)
+    on_base = np.flatnonzero(source >= 0)
+    share = _shares(base.corners[source[on_base]], part.corners[on_base])
+    carried[on_base] = np.einsum("tij,tjk->tik", share, values[source[on_base]])
+    return carried
+
+
+def _shares(face: Floats, points: Floats) -> Floats:
+    """Barycentric coordinates of `points`, (m, 3, 3), in the triangles `face`, (m, 3 corners, 3): (m, 3
+    points, 3).
+    """
+    a, b, c = face.swapaxes(0, 1)
+    plane = np.cross(b - a, c - a)
+    size = np.einsum("ij,ij->i", plane, plane)
+    flat = size <= np.finfo(float).tiny
+    size = np.where(flat, 1, size)[:, None]
+    offset = points - a[:, None]
+    share = np.empty((len(face), 3, 3))
+    share[..., 1] = np.einsum("mpk,mk->mp", offset, np.cross(c - a, plane)) / size
+    share[..., 2] = np.einsum("mpk,mk->mp", offset, np.cross(plane, b - a)) / size
+    share[..., 0] = 1 - share[..., 1] - share[..., 2]
+    if flat.any():
+        reach = np.linalg.norm(points[flat][:, :, None] - face[flat][:, None], axis=3)
+        share[flat] = np.eye(3)[reach.argmin(axis=2)]
+    for corner in range(3):
+        same = points == face[:, corner, None]
+        share[same[..., 0] & same[..., 1] & same[..., 2]] = np.eye(3)[corner]
+    return share

@@ -1,0 +1,82 @@
+"""What is measured on a finished part, and what is wrong with it in words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .closed import euler_number, is_closed, shell_volumes
+from .mesh import Mesh
+
+
+@dataclass(frozen=True)
+class Check:
+    """Measured on the part, never assumed.
+
+    watertight: every edge is shared by exactly two faces, in opposite directions
+    euler, base_euler: V - E + F of the part and of the base; every through-hole takes two
+    genus: handles of the part, all shells together
+    bodies, base_bodies: closed shells round material; cavities: shells round enclosed hollows
+    volume, base_volume, removed_volume: in cubic units
+    through: holes that pierce their wall
+    unchanged: every face of the base that no feature touches came out as it went in
+    problems: one sentence each; empty when the part is good
+    """
+
+    watertight: bool
+    euler: int
+    base_euler: int
+    genus: int
+    bodies: int
+    base_bodies: int
+    cavities: int
+    volume: float
+    base_volume: float
+    removed_volume: float
+    through: int
+    unchanged: bool
+    problems: tuple[str, ...]
+
+    @property
+    def good(self) -> bool:
+        """Nothing is wrong with the part."""
+        return not self.problems
+
+
+def check_part(mesh: Mesh, base: Mesh, through: int, unchanged: bool, problems: list[str]) -> Check:
+    """Measure the part `mesh` made from `base` with `through` through-holes; what is wrong comes after
+    `problems`.
+    """
+    before, after = shell_volumes(base), shell_volumes(mesh)
+    euler, base_euler = euler_number(mesh.triangles), euler_number(base.triangles)
+    expected = base_euler - 2 * through
+    bodies, base_bodies = int((after > 0).sum()), int((before > 0).sum())
+    watertight = is_closed(mesh.triangles)
+    problems = list(problems)
+    if not watertight:
+        problems.append("The part is not watertight: check the base for flaws near the holes.")
+    if euler != expected:
+        problems.append(
+            f"The part's Euler characteristic is {euler:,} instead of {expected:,}: "
+            "a hole is missing, torn open or goes through more than one wall."
+        )
+    if bodies > base_bodies:
+        problems.append(
+            f"{bodies - base_bodies:,} loose pieces were cut off the part: make the holes smaller."
+        )
+    if not unchanged:
+        problems.append("Faces of the base that no hole touches were changed: check the base for flaws.")
+    return Check(
+        watertight=watertight,
+        euler=euler,
+        base_euler=base_euler,
+        genus=len(after) - euler // 2,
+        bodies=bodies,
+        base_bodies=base_bodies,
+        cavities=int((after < 0).sum()),
+        volume=float(after.sum()),
+        base_volume=float(before.sum()),
+        removed_volume=float(before.sum() - after.sum()),
+        through=through,
+        unchanged=unchanged,
+        problems=tuple(problems),
+    )
