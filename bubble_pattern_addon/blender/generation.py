@@ -18,12 +18,12 @@ import numpy as np
 
 from ..core.errors import BaseError, PatternError, RegionError
 from ..core.mesh import Bools
-from ..core.metric import Constant, Places
+from ..core.metric import Places
 from ..core.pattern import Pattern
 from ..core.pipeline import pattern_steps
 from ..core.progress import Progress, Steps, drive
 from ..core.quality import Quality, measure, min_margin, min_web, open_area
-from ..core.recipe import Recipe, RegionChoice, default_recipe, neat
+from ..core.recipe import Recipe, RegionChoice, default_recipe
 from ..core.region import Region, make_region
 from ..core.selection import select
 from ..core.solid import Part, part_steps
@@ -44,8 +44,6 @@ from .reading import Base, evaluated_mesh, read_base
 
 # A pattern that took longer than this is not laid anew at every change of a setting.
 LIVE_SECONDS = 0.5
-# A region this many pitches wide has room for three rows of bubbles.
-THREE_ROWS = 1 + 3**0.5
 
 
 @dataclass(frozen=True)
@@ -104,21 +102,9 @@ def source_of(base: Base, selected: Bools) -> Source:
 
 
 def fitting_recipe(region: Region) -> Recipe:
-    """A good recipe for `region`: the default one for its area, with three rows at least in a strip."""
-    recipe = default_recipe(region.area)
+    """A good recipe for `region`, from its size alone."""
     segments = region.boundary_segments
-    perimeter = float(np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1).sum())
-    assert isinstance(recipe.packing.pitch, Constant)
-    assert isinstance(recipe.shaping.diameter, Constant)
-    if perimeter == 0 or recipe.packing.pitch.value <= (widest := 2 * region.area / perimeter / THREE_ROWS):
-        return recipe
-    pitch = neat(widest)
-    diameter = pitch * recipe.shaping.diameter.value / recipe.packing.pitch.value
-    return replace(
-        recipe,
-        packing=replace(recipe.packing, pitch=Constant(pitch)),
-        shaping=replace(recipe.shaping, diameter=Constant(float(f"{diameter:.6g}"))),
-    )
+    return default_recipe(region.area, float(np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1).sum()))
 
 
 def laying_steps(source: Source, recipe: Recipe) -> Steps[Laid]:

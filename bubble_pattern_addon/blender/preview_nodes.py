@@ -112,7 +112,8 @@ def preview_material() -> bpy.types.Material:
         material = bpy.data.materials.new(MATERIAL)
         material.diffuse_color = DARK
         material.roughness = 1.0
-        material.use_nodes = True
+        if bpy.app.version < (5, 0, 0):  # from 5.0 on every material has nodes
+            material.use_nodes = True
         shader = material.node_tree.nodes.get("Principled BSDF")
         if shader is not None:
             shader.inputs["Base Color"].default_value = DARK
