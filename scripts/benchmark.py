@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import manifold3d
 import numpy as np
@@ -123,7 +124,8 @@ def peer_row(name: str, method: str, found: peers.Arrangement, region: Region, s
     """Measure a peer's points; its pitch is the spacing asked for, its first row what is nearest the rim."""
     n = len(found.position)
     distance = boundary_distance(found.position, region.boundary_segments)
-    row = np.where(distance < distance.min() + 0.35 * found.spacing, 0, 1)
+    first = distance < distance.min() + 0.35 * found.spacing
+    row = np.where(first & (distance.min() > 0.1 * found.spacing), 0, 1)
     pitch = np.full(n, found.spacing)
     quality = measure_points(found.position, found.normal, pitch, row, region.boundary_segments)
     mirror = mirrored(found.position, found.spacing) if name in SYMMETRIC else np.nan
@@ -157,9 +159,7 @@ def against(
 
 def flat(repeats: int) -> None:
     """Flat regions against gmsh, the clipped grid and Lloyd's relaxation."""
-    print(
-        "\n## Packing, flat\n\nOur trapezoid is a coarse n-gon; gmsh meshes it with true arcs, half a pitch in."
-    )
+    print("\n## Packing, flat\n\nOur trapezoid is a coarse n-gon; gmsh has true arcs, half a pitch in.")
     print_head(HEAD)
     gmsh = installed("gmsh")
     trapezoid = SHAPES["trapezoid"]()
@@ -207,13 +207,17 @@ def adding(repeats: int) -> None:
     """`part_steps` with everything it does against the bare subtraction of the same cutters."""
     print("\n## Adding\n\n32-sided through-holes; bare: the subtraction alone, both solids built beforehand.")
     print_head("| base | triangles | holes | ours, s | bare, s | ratio | watertight | genus | problems |")
-    cases: list[tuple[str, Shape, float]] = [
+    for name, shape, pitch in adding_cases():
+        add(name, shape, pitch, repeats)
+
+
+def adding_cases() -> list[tuple[str, Shape, float]]:
+    """Bases for adding, with the pitch that gives about 1,000, 10,000 and 10,000 holes."""
+    return [
         ("curved slab", curved_slab(), 6.5),
         ("curved slab", curved_slab(), 2.15),
-        ("flat plate, two-triangle faces", plate(300.0, 300.0, 3.0, 2.9), 3.22),
+        ("flat plate, two-triangle faces", plate(300.0, 300.0, 3.0, 3.22), 3.22),
     ]
-    for name, shape, pitch in cases:
-        add(name, shape, pitch, repeats)
 
 
 def add(name: str, shape: Shape, pitch: float, repeats: int) -> None:
@@ -236,6 +240,42 @@ def add(name: str, shape: Shape, pitch: float, repeats: int) -> None:
         f"| {check.genus:,} | {len(check.problems)} |",
         flush=True,
     )
+
+
+def blender(repeats: int) -> None:
+    """Adding in Blender from object to mesh against the Boolean modifier with the MANIFOLD solver."""
+    if not installed("bpy"):
+        return
+    from scripts import peers_blender as inside
+
+    print(f"\n## Adding in Blender {inside.version()}\n\nFrom the object to the new mesh, same cutters.")
+    print_head("| base | holes | ours, s | modifier, s | ratio | faces, ours | faces, modifier |")
+    for name, shape, pitch in adding_cases():
+        inside.clear()
+        base_object = inside.place(shape.mesh, "base")
+        assert inside.unchanged(base_object, shape.mesh)
+        read = Shape(inside.read(base_object).mesh, shape.selected, pitch)
+        pattern = pack(read, pitch)[0]
+        feature = Feature(kind="hole", sides=32)
+        cutters = drive(plan_steps(read.mesh, pattern, feature)).cutters.mesh
+        cutter_object = inside.place(cutters, "cutters")
+        faces = [0, 0]
+
+        def ours(given: tuple[Any, ...] = (base_object, pattern, feature), faces: list[int] = faces) -> float:
+            seconds, faces[0] = inside.ours(*given)
+            return seconds
+
+        def theirs(given: tuple[Any, ...] = (base_object, cutter_object), faces: list[int] = faces) -> float:
+            seconds, faces[1] = inside.modifier(*given)
+            return seconds
+
+        mine, other = in_turn([ours, theirs], repeats)
+        print(
+            f"| {name} | {len(pattern):,} | {mine:.2f} | {other:.2f} | **{mine / other:.2f}** "
+            f"| {faces[0]:,} | {faces[1]:,} |",
+            flush=True,
+        )
+    inside.clear()
 
 
 def bare_subtract(base: Mesh, cutters: Mesh) -> float:
@@ -279,7 +319,12 @@ def installed(module: str) -> bool:
     return there
 
 
-SECTIONS: dict[str, Callable[[int], None]] = {"flat": flat, "curved": curved, "adding": adding}
+SECTIONS: dict[str, Callable[[int], None]] = {
+    "flat": flat,
+    "curved": curved,
+    "adding": adding,
+    "blender": blender,
+}
 
 
 def main() -> None:

@@ -58,8 +58,8 @@ def gmsh_trapezoid(pitch: float, size: float) -> Arrangement:
 
     if not gmsh.isInitialized():
         gmsh.initialize(interruptible=False)
+        gmsh.option.setNumber("General.Terminal", 0)
     gmsh.clear()
-    gmsh.option.setNumber("General.Verbosity", 0)
     gmsh.option.setNumber("Mesh.Algorithm", 6)
     _draw_trapezoid(gmsh.model.geo, pitch / 2, size)
     start = time.perf_counter()
