@@ -20,9 +20,8 @@ BLOCK = 1 << 18
 def crossing_triangles(mesh: Mesh, tree: BoxTree) -> Ints:
     """Pairs of triangles of `mesh` that reach through each other, (k, 2), k = 0 for a sound surface.
 
-    Two triangles do if an edge of one pierces the inside of the other, or if they lie in one plane, face the
-    same way and overlap. Faces that only touch do not, nor do faces back to back, as where two bodies lie on
-    each other.
+    Two triangles do if an edge of one pierces the other, or if they lie in one plane, face the same way and
+    overlap. Faces that only touch do not, nor do faces back to back, as where two bodies lie on each other.
     """
     size = np.linalg.norm(mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0))
     slack = SHALLOWEST * float(size)
@@ -30,10 +29,24 @@ def crossing_triangles(mesh: Mesh, tree: BoxTree) -> Ints:
     length = np.linalg.norm(plane, axis=1)
     # a face without area has no plane: its heights are 0, so it is never through anything
     normal = plane / np.where(length > 0, length, 1)[:, None]
-    found = [np.zeros((0, 2), dtype=np.int64)]
+    overlapping, stabs = [], []
     for pair in close_pairs(tree):
-        found.append(pair[_cross(mesh, normal, pair, slack)])
-    return np.concatenate(found)
+        # most pairs are neighbours, whose planes clear them: what is cheap and clears many comes first
+        over = _heights(mesh, normal, pair[:, 0], pair[:, 1])
+        left = np.flatnonzero(_straddles(over, slack))
+        under = _heights(mesh, normal, pair[left, 1], pair[left, 0])
+        both = _straddles(under, slack)
+        left, under = left[both], under[both]
+        stabs += [
+            _stabs(mesh, normal, pair[left], under, slack),
+            _stabs(mesh, normal, pair[left, ::-1], over[left], slack),
+        ]
+        flat = np.abs(over) <= slack
+        level = pair[flat[:, 0] & flat[:, 1] & flat[:, 2]]
+        overlapping.append(level[_overlaps(mesh, normal, level, slack)])
+    if not stabs:
+        return np.zeros((0, 2), dtype=np.int64)
+    return np.concatenate([*overlapping, _piercing(mesh, np.concatenate(stabs))])
 
 
 def close_pairs(tree: BoxTree) -> Iterator[Ints]:
@@ -59,35 +72,10 @@ def close_pairs(tree: BoxTree) -> Iterator[Ints]:
         waiting.append((level - 1, one[there], other[there]))
 
 
-def _cross(mesh: Mesh, normal: Floats, pair: Ints, slack: float) -> Bools:
-    """Do the triangles of each pair, (m, 2), reach through each other by more than `slack`? (m,)"""
-    # most pairs are neighbours, whose planes clear them: what is cheap and clears many comes first
-    over = _heights(mesh, normal, pair[:, 0], pair[:, 1])
-    left = np.flatnonzero(_straddles(over, slack))
-    under = _heights(mesh, normal, pair[left, 1], pair[left, 0])
-    left, under = _those(_straddles(under, slack), left, under)
-    crossing = np.zeros(len(pair), dtype=bool)
-    heights = np.stack([under, over[left]], axis=1)
-    crossing[left] = _pierces(mesh.vertices[mesh.triangles[pair[left]]], normal[pair[left]], heights, slack)
-
-    flat = np.abs(over) <= slack
-    level = np.flatnonzero(flat[:, 0] & flat[:, 1] & flat[:, 2])
-    level = level[np.einsum("mk,mk->m", normal[pair[level, 0]], normal[pair[level, 1]]) > 0]
-    one, other = mesh.triangles[pair[level, 0]], mesh.triangles[pair[level, 1]]
-    # neighbours across an edge cannot overlap while they face the same way
-    level = level[(one[:, :, None] == other[:, None]).any(axis=2).sum(axis=1) < 2]
-    crossing[level] = _overlaps(mesh.vertices[mesh.triangles[pair[level]]], normal[pair[level]], slack)
-    return crossing
-
-
 def _straddles(height: Floats, slack: float) -> Bools:
     """Are some of the three heights, (m, 3), clearly above 0 and some clearly below?"""
     below, above = height < -slack, height > slack
     return (below[:, 0] | below[:, 1] | below[:, 2]) & (above[:, 0] | above[:, 1] | above[:, 2])
-
-
-def _those(chosen: Bools, *arrays: np.ndarray) -> tuple[np.ndarray, ...]:
-    return tuple(array[chosen] for array in arrays)
 
 
 def _heights(mesh: Mesh, normal: Floats, plane: Ints, triangle: Ints) -> Floats:
@@ -98,35 +86,78 @@ def _heights(mesh: Mesh, normal: Floats, plane: Ints, triangle: Ints) -> Floats:
     return np.einsum("mck,mk->mc", corners, up) - level[:, None]
 
 
-def _pierces(corners: Floats, normal: Floats, height: Floats, slack: float) -> Bools:
-    """Does an edge of one triangle pass through the inside of the other, clear of its edges by `slack`?"""
-    found = np.zeros(len(corners), dtype=bool)
-    for one, other in ((0, 1), (1, 0)):
-        edge = np.roll(corners[:, other], -1, axis=1) - corners[:, other]
-        inward = np.cross(normal[:, other, None], edge)
-        inward /= np.linalg.norm(inward, axis=2)[..., None]
-        for corner in range(3):
-            start, end = corners[:, one, corner], corners[:, one, (corner + 1) % 3]
-            rise, fall = height[:, one, corner], height[:, one, (corner + 1) % 3]
-            passes = np.minimum(rise, fall) < -slack
-            passes &= np.maximum(rise, fall) > slack
-            share = rise / np.where(passes, rise - fall, 1)
-            point = start + share[:, None] * (end - start)
-            room = np.einsum("mck,mck->mc", point[:, None] - corners[:, other], inward)
-            found |= passes & np.all(room > slack, axis=1)
-    return found
+def _stabs(mesh: Mesh, normal: Floats, pair: Ints, height: Floats, slack: float) -> Ints:
+    """Edges of the first triangle of each pair, (m, 2), that pass through the second one's plane within it.
 
-
-def _overlaps(corners: Floats, normal: Floats, slack: float) -> Bools:
-    """Do two triangles in one plane share more than a strip `slack` wide? None of their six edges separates
-    them.
+    height: (m, 3) of the first's corners over that plane. Returns rows of first, second, ends of the edge
+    (lower vertex first), direction through the plane, and where the second is met: -1 -1 inside, two
+    vertices on the edge between them, a vertex and -1 in that vertex; (k, 7).
     """
-    found = np.ones(len(corners), dtype=bool)
-    for one in (0, 1):
-        edge = np.roll(corners[:, one], -1, axis=1) - corners[:, one]
-        inward = np.cross(normal[:, one, None], edge)
+    target = mesh.triangles[pair[:, 1]]
+    corners = mesh.vertices[target]
+    along = np.roll(corners, -1, axis=1) - corners
+    inward = np.cross(normal[pair[:, 1], None], along)
+    inward /= np.linalg.norm(inward, axis=2)[..., None]
+    found = []
+    for corner in range(3):
+        ends = mesh.triangles[pair[:, 0]][:, [corner, (corner + 1) % 3]]
+        # always from the lower vertex, so that both faces of an edge find it in the same place
+        swap = ends[:, 0] > ends[:, 1]
+        ends[swap] = ends[swap, ::-1]
+        rise, fall = height[:, corner], height[:, (corner + 1) % 3]
+        rise, fall = np.where(swap, fall, rise), np.where(swap, rise, fall)
+        passes = (np.minimum(rise, fall) < -slack) & (np.maximum(rise, fall) > slack)
+        start, end = mesh.vertices[ends[:, 0]], mesh.vertices[ends[:, 1]]
+        point = start + (rise / np.where(passes, rise - fall, 1))[:, None] * (end - start)
+        room = np.einsum("mck,mck->mc", point[:, None] - corners, inward)
+        hit = np.flatnonzero(passes & np.all(room > -slack, axis=1))
+        border = room[hit] <= slack
+        side, sides = border.argmax(axis=1), border.sum(axis=1)
+        # two sides meet in the corner at the end of the first of them, or at its start if they are the first
+        # and last
+        meet = np.where(border[:, 0] & border[:, 2] & ~border[:, 1], 0, side + 1) % 3
+        here = np.take_along_axis(target[hit], np.where(sides > 1, meet, side)[:, None], axis=1)[:, 0]
+        there = np.take_along_axis(target[hit], (side[:, None] + 1) % 3, axis=1)[:, 0]
+        low = np.where(sides == 0, -1, np.where(sides == 1, np.minimum(here, there), here))
+        high = np.where(sides == 1, np.maximum(here, there), -1)
+        found.append(np.column_stack([pair[hit], ends[hit], rise[hit] > 0, low, high]))
+    return np.concatenate(found).astype(np.int64)
+
+
+def _piercing(mesh: Mesh, stabs: Ints) -> Ints:
+    """Pairs (k, 2) of triangles whose `stabs`, rows of `_stabs`, go through the surface rather than touch it.
+
+    Inside a triangle that is plain. On an edge or in a corner every face round it must be passed the same
+    way: a body lying on another passes some of their planes there, but not all.
+    """
+    inside = stabs[:, 5] < 0
+    doubtful = stabs[~inside]
+    if len(doubtful) == 0:
+        return stabs[inside, :2]
+    _, kept = np.unique(doubtful[:, 1:], axis=0, return_index=True)
+    doubtful = doubtful[kept]
+    _, group, count = np.unique(doubtful[:, 2:], axis=0, return_inverse=True, return_counts=True)
+    faces = np.bincount(mesh.triangles.ravel(), minlength=len(mesh.vertices))
+    needed = np.where(doubtful[:, 6] < 0, faces[doubtful[:, 5]], 2)
+    return np.concatenate([stabs[inside, :2], doubtful[count[group.ravel()] >= needed, :2]])
+
+
+def _overlaps(mesh: Mesh, normal: Floats, pair: Ints, slack: float) -> Bools:
+    """Do two triangles in one plane, (m, 2), face the same way and share more than a strip `slack` wide?
+    (m,)
+    """
+    found = np.einsum("mk,mk->m", normal[pair[:, 0]], normal[pair[:, 1]]) > 0
+    one, other = mesh.triangles[pair[:, 0]], mesh.triangles[pair[:, 1]]
+    # neighbours across an edge cannot overlap while they face the same way
+    found &= (one[:, :, None] == other[:, None]).any(axis=2).sum(axis=1) < 2
+    some = pair[found]
+    apart = np.zeros(len(some), dtype=bool)
+    for one, other in (some.T, some[:, ::-1].T):
+        corners, points = mesh.vertices[mesh.triangles[one]], mesh.vertices[mesh.triangles[other]]
+        inward = np.cross(normal[one, None], np.roll(corners, -1, axis=1) - corners)
         inward /= np.linalg.norm(inward, axis=2)[..., None]
         for side in range(3):
-            offset = corners[:, 1 - one] - corners[:, one, side][:, None]
-            found &= np.einsum("mck,mk->mc", offset, inward[:, side]).max(axis=1) > slack
+            offset = points - corners[:, side, None]
+            apart |= np.einsum("mck,mk->mc", offset, inward[:, side]).max(axis=1) <= slack
+    found[found] = ~apart
     return found

@@ -222,7 +222,7 @@ _REASONS = {
 def _failures(plan: Plan) -> tuple[tuple[int, str], ...]:
     """A sentence for every feature that was not cut."""
     return tuple(
-        (int(which), f"{_place(plan.pattern, which).capitalize()} {_REASONS[Fault(plan.fault[which])]}.")
+        (int(which), f"{_place(plan.pattern, int(which)).capitalize()} {_REASONS[Fault(plan.fault[which])]}.")
         for which in np.flatnonzero(plan.fault)
     )
 

@@ -45,7 +45,6 @@ def sound_base(base: Mesh) -> SoundBase:
         sound = _without_collapsed(base, weld(base.vertices))
         _check_edges(sound.mesh)
     sound = _without_pinches(sound)
-    _check_orientation(sound.mesh)
     crossing = crossing_triangles(sound.mesh, build_tree(sound.mesh.corners))
     if len(crossing):
         faces = np.unique(crossing)
@@ -54,6 +53,7 @@ def sound_base(base: Mesh) -> SoundBase:
             f"The base passes through itself: {len(faces):,} faces reach through one another, {place}. "
             "Unite the overlapping parts first."
         )
+    _check_orientation(sound.mesh)
     return sound
 
 
@@ -144,47 +144,57 @@ def _check_orientation(mesh: Mesh) -> None:
     volume = np.bincount(shell, weights=signed_volumes(mesh))
     area = np.bincount(shell, weights=np.linalg.norm(mesh.area_vectors, axis=1))
     empty = np.flatnonzero(np.abs(volume) <= 1e-12 * area**1.5)
-    first = np.unique(shell, return_index=True)[1]
-    probe = mesh.vertices[mesh.triangles[first, 0]]
-    inside = _depth(mesh, shell, probe)
+    probe = _probes(mesh, shell)
+    depth = _depth(mesh, shell, probe)
+    # where bodies touch, a probe on the other's surface may count either way: all of a shell's must agree
+    outside, inside = np.all(depth < 1, axis=1), np.all(depth > 0, axis=1)
     for wrong, text in (
         (empty, "encloses no volume, {}: choose a closed part with some thickness"),
         (
-            np.flatnonzero((volume < 0) & (inside < 1)),
+            np.flatnonzero((volume < 0) & outside),
             "is inside out (its faces point inward), {}: flip its normals",
         ),
         (
-            np.flatnonzero((volume > 0) & (inside > 0)),
+            np.flatnonzero((volume > 0) & inside),
             "has a body inside another body, {}: unite or remove it",
         ),
     ):
         if len(wrong):
-            raise BaseError(f"The base {text.format(_where(probe[wrong]))}.")
+            raise BaseError(f"The base {text.format(_where(probe[wrong, 0]))}.")
+
+
+def _probes(mesh: Mesh, shell: Ints) -> Floats:
+    """Corners of each shell that lie farthest out along x, y and z, both ways, (shells, 6, 3)."""
+    owner, corners = np.repeat(shell, 3), mesh.corners.reshape(-1, 3)
+    probes = []
+    for axis in range(3):
+        order = np.lexsort((corners[:, axis], owner))
+        bounds = np.searchsorted(owner[order], np.arange(shell.max() + 2))
+        probes += [corners[order[bounds[:-1]]], corners[order[bounds[1:] - 1]]]
+    return np.stack(probes, axis=1)
 
 
 def _depth(mesh: Mesh, shell: Ints, probe: Floats) -> Ints:
-    """How many times the other shells wind round each shell's `probe` point, (shells,).
+    """How many times the other shells wind round each shell's points `probe`, (shells, 6, 3): (shells, 6).
 
     The solid angle of a triangle after A. van Oosterom and J. Strackee, The solid angle of a plane triangle,
     1983.
     """
-    depth = np.zeros(len(probe), dtype=np.int64)
-    if len(probe) == 1:
-        return depth
-    low = np.full((len(probe), 3), np.inf)
-    high = -low
-    np.minimum.at(low, shell, mesh.corners.min(axis=1))
-    np.maximum.at(high, shell, mesh.corners.max(axis=1))
-    for which, point in enumerate(probe):
-        around = np.all((low <= point) & (high >= point), axis=1)
+    depth = np.zeros(probe.shape[:2], dtype=np.int64)
+    low, high = probe.min(axis=1), probe.max(axis=1)
+    # shells within another's box are few, and only for them there is something to find out
+    for which in range(len(probe)):
+        around = np.all((low <= low[which]) & (high >= high[which]), axis=1)
         around[which] = False
         if not around.any():
             continue
-        a, b, c = (mesh.corners[around[shell]] - point).swapaxes(0, 1)
-        la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
-        above = np.einsum("ij,ij->i", a, np.cross(b, c))
-        below = la * lb * lc + _dot(a, b) * lc + _dot(b, c) * la + _dot(c, a) * lb
-        depth[which] = round(float(np.arctan2(above, below).sum()) / (2 * np.pi))
+        faces = mesh.corners[around[shell]]
+        for number, point in enumerate(probe[which]):
+            a, b, c = (faces - point).swapaxes(0, 1)
+            la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
+            above = _dot(a, np.cross(b, c))
+            below = la * lb * lc + _dot(a, b) * lc + _dot(b, c) * la + _dot(c, a) * lb
+            depth[which, number] = round(float(np.arctan2(above, below).sum()) / (2 * np.pi))
     return depth
 
 
