@@ -178,9 +178,6 @@ def _judge(base: Mesh, feature: Feature, plan: Plan, mesh: Mesh, facet: Ints) ->
     source[~on_base] = -1 - cutters.feature[-1 - facet[~on_base]]
     vertex = np.where(named >= 0, sound.vertex[named], -1)
 
-    reached = np.zeros(len(sound.mesh.triangles), dtype=bool)
-    reached[plan.wall.seen_triangle[plan.meets]] = True
-    reached[facet[whole]] = True
     shape = _wall_shapes(plan, mesh, facet)
     cut = plan.fault == Fault.NONE
     pierced = cut & (shape == 0)
@@ -192,8 +189,28 @@ def _judge(base: Mesh, feature: Feature, plan: Plan, mesh: Mesh, facet: Ints) ->
     if len(torn):
         state = "do not pierce one wall cleanly" if feature.depth is None else "have no clean floor and wall"
         problems.append(f"{len(torn):,} holes {state}, the first is {_place(plan.pattern, int(torn[0]))}.")
-    check = check_part(mesh, sound.mesh, int(pierced.sum()), bool(reached.all()), problems)
+    unchanged = _unchanged(plan, mesh, facet, named, whole)
+    check = check_part(mesh, sound.mesh, int(pierced.sum()), unchanged, problems)
     return Part(mesh, source, vertex, whole, plan.wall.thickness, pierced, failures, check)
+
+
+def _unchanged(plan: Plan, mesh: Mesh, facet: Ints, named: Ints, whole: Bools) -> bool:
+    """Is the surface the same wherever no cutter reaches?
+
+    Every face there must come out whole; or, beside faces without area, which the boolean dissolves into
+    their neighbours, in pieces that have only corners of the base and together the face's area.
+    """
+    base = plan.sound.mesh
+    changed = np.ones(len(base.triangles), dtype=bool)
+    changed[facet[whole]] = False
+    changed[plan.wall.seen_triangle[plan.meets]] = False
+    doubtful = np.flatnonzero(facet >= 0)
+    doubtful = doubtful[changed[facet[doubtful]]]
+    area = np.linalg.norm(base.area_vectors, axis=1)
+    pieces = np.linalg.norm(Mesh(mesh.vertices, mesh.triangles[doubtful]).area_vectors, axis=1)
+    covered = np.bincount(facet[doubtful], weights=pieces, minlength=len(area))
+    named_only = np.all(named[mesh.triangles[doubtful]] >= 0)
+    return bool(named_only and np.all(np.abs(covered - area)[changed] <= 1e-9 * area[changed]))
 
 
 def _wall_shapes(plan: Plan, mesh: Mesh, facet: Ints) -> Floats:
