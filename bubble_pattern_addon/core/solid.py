@@ -78,6 +78,10 @@ def part_steps(base: Mesh, pattern: Pattern, feature: Feature) -> Steps[Part]:
     Raises BaseError when the base is not fit for a solid, RecipeError when the feature makes no sense. A
     single feature that cannot be added (wall too thick, next wall too close) is left out and reported in the
     part.
+
+    The boolean is one step: no call of manifold3d 3.5.4 lets go of the interpreter while it works, so that a
+    thread beside it could neither read its progress nor cancel it. Everything before and after can be given
+    up.
     """
     plan = yield from plan_steps(base, pattern, feature)
     yield Progress("Cutting", 0.3)
@@ -229,8 +233,10 @@ def _wall_shapes(plan: Plan, mesh: Mesh, facet: Ints) -> Floats:
 _REASONS = {
     Fault.OFF: "does not lie on the base's surface",
     Fault.FOLDED: "covers a place where the surface folds away or rises steeply: move it or make it smaller",
-    Fault.THICK: "finds no far side of the wall within reach: give it a depth, or make the wall thinner",
+    Fault.THICK: f"finds no far side of the wall within {DEEPEST:g} diameters, too thick to pierce: "
+    "give it a depth or make the wall thinner",
     Fault.CROWDED: "cannot pierce the near wall without cutting into the wall behind it",
+    Fault.COVERED: "cannot be reached without cutting into what lies over the surface there",
     Fault.BREAKS: "would break through the wall: make it shallower",
     Fault.MEETS: "would run into another hole inside the wall: make it smaller or give it a depth",
 }

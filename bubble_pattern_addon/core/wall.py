@@ -40,6 +40,7 @@ class Fault(IntEnum):
     CROWDED = 4
     BREAKS = 5
     MEETS = 6
+    COVERED = 7
 
 
 @dataclass(frozen=True)
@@ -113,8 +114,15 @@ def _look(base: Mesh, tree: BoxTree, pattern: Pattern, ids: Ints, deepest: Float
         & (spans.high >= far_low[owner] - sheets.slack[owner])
     )
     fault = np.zeros(len(ids), dtype=np.int64)
+    # something over the surface whose underside dips below the surface's highest point under the disc
+    covering = sheets.any(
+        back
+        & (spans.low > np.nan_to_num(far_high, nan=-np.inf)[owner] + sheets.slack[owner])
+        & (spans.low <= surface_high[owner] + sheets.slack[owner])
+    )
     fault[beside] = Fault.CROWDED
     fault[~np.isfinite(thickness) | (-far_low > deepest)] = Fault.THICK
+    fault[covering] = Fault.COVERED
     fault[(surface_high > STEEPEST * radius) | (surface_low < -STEEPEST * radius)] = Fault.FOLDED
     fault[~on_base] = Fault.OFF
     seen = (ids[owner], triangle, spans.low, spans.high, spans.axis)

@@ -249,8 +249,8 @@ def test_a_feature_off_the_surface_is_reported():
     assert "does not lie on" in part.failures[0][1]
 
 
-def test_a_gentle_crease_is_cut_like_any_other_place():
-    ridge = Mesh(
+def roof() -> Mesh:
+    return Mesh(
         np.array(
             [
                 [x, y, z]
@@ -267,6 +267,27 @@ def test_a_gentle_crease_is_cut_like_any_other_place():
             ]
         ),
     )
+
+
+def test_what_lies_over_a_roof_closer_than_the_roof_falls_is_reported_not_cut():
+    lid = roof()
+    lid.vertices[:, 2] += 2.05
+    part = make(together(roof(), lid), laid([[0, 0, 0], [4, 0, -2]], [[0, 0, 1], [1, 0, 2]], 3, 2.0))
+    assert [feature for feature, _ in part.failures] == [0]
+    assert "over the surface" in part.failures[0][1]
+    assert part.pierced.tolist() == [False, True]
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e3])
+def test_the_unit_of_length_does_not_matter(scale):
+    base = moved(slab(), np.eye(3) * scale)
+    pattern = on_slab(slab())
+    part = make(base, laid(pattern.position * scale, pattern.normal, 2 * scale, pattern.diameter * scale))
+    assert_good(part, base, len(pattern))
+
+
+def test_a_gentle_crease_is_cut_like_any_other_place():
+    ridge = roof()
     part = make(ridge, laid([[0, 0, 0], [0, 3, 0], [0, -3, 0]], UP, 3, 2.0))
     assert_good(part, ridge, 3)
 
