@@ -157,10 +157,9 @@ def _in_space(flat: Floats, offset: Floats) -> Floats:
     crown = -(x**2) / (2 * 400) - y**2 / (2 * 260) - 0.0004 * x * y
     bead = 2.6 * _smooth((offset - 0.4) / 6.5) - 1.0 * _smooth((offset - 8.5) / 11)
     r = np.linalg.norm(flat - ISLAND, axis=1)
+    # gentle enough to be offset by the thickness: the quintic's sharpest radius is width^2 / (5.8 height)
     cap = (
-        2.2 * _smooth((ISLAND_RADIUS - r) / 4.0)
-        - 1.3 * _smooth((13.6 - r) / 2.6)
-        + 0.5 * _smooth((9 - r) / 9)
+        1.9 * _smooth((ISLAND_RADIUS - r) / 5.5) - 1.0 * _smooth((13 - r) / 4.5) + 0.4 * _smooth((8 - r) / 8)
     )
     z = crown + bead + cap - FILLET * (1 - np.cos(arc)) - down
     return np.stack([x, y, z], axis=1)

@@ -361,6 +361,32 @@ def enter(*groups: str, blender: str | None = None) -> None:
     os.execv(command[0], command)
 
 
+def borrow(libraries: Sequence[str]) -> None:
+    """Let the Blender that runs this script import libraries that it does not bring along.
+
+    They are installed beside this folder with Blender's own Python on first use, to fit Blender's own numpy,
+    which stays the one in use. On trouble say one line and exit 1.
+    """
+    import numpy
+
+    version = f"{sys.version_info[0]}.{sys.version_info[1]}"
+    folder = ROOT / f".venv-inside-{version}-numpy-{numpy.__version__}"
+    marker = folder / "complete"
+    try:
+        with _lock(folder):
+            if not marker.exists():
+                _make_venv(folder, Path(sys.executable))
+                _install(folder, [f"numpy=={numpy.__version__}", *libraries])
+                marker.touch()
+    except (EnvironmentProblem, OSError) as problem:
+        sys.exit(
+            f"{Path(__file__).name}: Blender lacks {', '.join(libraries)}, and they can't be installed "
+            f"({problem}): install the Bubble Pattern extension in Blender, which brings them"
+        )
+    inside = "Lib/site-packages" if os.name == "nt" else f"lib/python{version}/site-packages"
+    sys.path.append(str(folder / inside))
+
+
 def main() -> None:
     """Make an environment by hand."""
     parser = argparse.ArgumentParser(description="Make the project's Python environment.")

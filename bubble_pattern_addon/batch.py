@@ -1,0 +1,288 @@
+"""The batch run: a base and a recipe in; a folder with the part, the hole table and the report out.
+
+One implementation for `scripts/pattern_batch.py`, in Blender and in plain Python, and for the extension's own
+command. What only Blender can do (a .blend as base, a .blend or a picture as output) is asked of
+`blender.batch_base`, which is imported only then.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any, NoReturn, Protocol
+
+import numpy as np
+
+from .core.errors import BaseError, OutputError, PatternError, RecipeError, RegionError
+from .core.export import make_report, write_features, write_report
+from .core.files import LoadedBase, load_base, output_folder, write_mesh
+from .core.mesh import Bools
+from .core.metric import Constant
+from .core.pattern import Pattern
+from .core.pipeline import pattern_steps
+from .core.progress import Progress, Steps, drive
+from .core.quality import min_margin, min_web
+from .core.recipe import Recipe, default_recipe, load_recipe, recipe_to_toml
+from .core.region import Region, make_region
+from .core.selection import select
+from .core.solid import Part, part_steps
+
+EXAMPLE = """\
+example of a recipe:
+  [region]
+  near = [0.0, 12.5, 3.0]   # the face nearest to this point, grown over edges flatter than max_angle
+  max_angle = 20
+  [packing]
+  pitch = 3.0
+  [shaping]
+  diameter = 1.8
+
+example of a run:
+  %(prog)s grille.toml --base panel.stl --out grille
+"""
+
+
+@dataclass(frozen=True)
+class Run:
+    """Everything a batch run knows when the part is made; selected: (T,) the target region's triangles."""
+
+    recipe: Recipe
+    base: LoadedBase
+    selected: Bools
+    region: Region
+    pattern: Pattern
+    part: Part
+    report: Mapping[str, Any]
+
+
+class BlenderSide(Protocol):
+    """What `blender.batch_base` does for a batch run."""
+
+    def read_base(self, path: Path | None) -> LoadedBase:
+        """The base in a .blend file, in world coordinates; None: in the file that is open."""
+        ...
+
+    def write_blend(self, path: Path, run: Run) -> None:
+        """A .blend that opens with the base, the editable pattern and the part."""
+        ...
+
+    def write_picture(self, path: Path, run: Run) -> None:
+        """A rendered view of the part as PNG."""
+        ...
+
+
+# -- the work ------------------------------------------------------------------------------------------------
+
+
+def run_steps(base: LoadedBase, recipe_file: Path) -> Steps[Run]:
+    """From a base and a recipe file to a good part; a generator of Progress.
+
+    Raises PatternError of every kind, also where the finished part is not good.
+    """
+    clock = Clock()
+    yield Progress("Reading the region", 0.0)
+    selected = select(base.mesh, load_recipe(recipe_file).region, base.attributes, base.materials)
+    region = make_region(base.mesh, selected)
+    segments = region.boundary_segments
+    perimeter = float(np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1).sum())
+    recipe = load_recipe(recipe_file, default_recipe(region.area, perimeter))
+    clock.stop("region")
+    pattern = yield from clock.timed(pattern_steps(region, recipe))
+    check_limits(recipe, region, pattern)
+    part = yield from part_steps(base.mesh, pattern, recipe.feature)
+    clock.stop("add")
+    report = make_report(region, pattern, part, clock.seconds)
+    if part.check.problems:
+        raise BaseError(f"The part is not good: {' '.join(part.check.problems)}")
+    return Run(recipe, base, selected, region, pattern, part, report)
+
+
+class Clock:
+    """Seconds that the stages of a run take: region, pack, shape, add."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self.last = time.perf_counter()
+
+    def stop(self, stage: str) -> None:
+        """Book the time since the last stop on this stage."""
+        now = time.perf_counter()
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + now - self.last
+        self.last = now
+
+    def timed(self, steps: Steps[Pattern]) -> Steps[Pattern]:
+        """Pass steps 1 and 2 on, and book what follows a "Shaping" on the stage shape, all else on pack."""
+        stage = "pack"
+        while True:
+            try:
+                progress = next(steps)
+            except StopIteration as end:
+                self.stop(stage)
+                self.seconds.setdefault("shape", 0.0)
+                return end.value  # type: ignore[no-any-return]
+            self.stop(stage)
+            stage = "shape" if progress.stage.startswith("Shaping") else "pack"
+            yield progress
+
+
+def check_limits(recipe: Recipe, region: Region, pattern: Pattern) -> None:
+    """RegionError where no feature fits, RecipeError where less material remains than the limits ask for."""
+    if not len(pattern):
+        raise RegionError(
+            "No feature fits into the target region: make the pitch smaller or the region larger"
+        )
+    web, margin, limits = min_web(pattern), min_margin(pattern, region), recipe.limits
+    diameter = recipe.shaping.diameter
+    most = (
+        f"make the diameter at most {diameter.value - (limits.min_web - web):.4g}"
+        if isinstance(diameter, Constant)
+        else "make the diameters smaller"
+    )
+    if web < limits.min_web:
+        raise RecipeError(f"The smallest web is {web:.4g}, below min_web = {limits.min_web:g}: {most}")
+    if margin < limits.min_margin:
+        raise RecipeError(
+            f"The smallest margin is {margin:.4g}, below min_margin = {limits.min_margin:g}: "
+            f"raise edge_offset by {limits.min_margin - margin:.4g}"
+        )
+
+
+def write_run(run: Run, folder: Path, blender: Callable[[], BlenderSide]) -> None:
+    """All files of a run, into a folder that is there (see files.output_folder)."""
+    write_mesh(folder / "part.stl", run.part.mesh)
+    for name in run.recipe.output.formats:
+        write_mesh(folder / f"part.{name}", run.part.mesh)
+    write_features(folder / "features.csv", run.pattern)
+    write_report(folder / "report.json", run.report)
+    (folder / "recipe.toml").write_text(recipe_to_toml(run.recipe), encoding="utf-8")
+    if run.recipe.output.blend:
+        blender().write_blend(folder / "pattern.blend", run)
+    if run.recipe.output.picture:
+        blender().write_picture(folder / "part.png", run)
+
+
+def blender_side() -> BlenderSide:
+    """Blender's part in a batch run. OutputError where this Python has no Blender in it."""
+    try:
+        import bpy  # noqa: F401
+    except ImportError as error:
+        raise OutputError(
+            f"A .blend file or a picture needs Blender ({error}): run this in Blender, with "
+            "`blender -b -P scripts/pattern_batch.py -- ...`"
+        ) from None
+    from .blender import batch_base
+
+    return batch_base
+
+
+# -- the command ---------------------------------------------------------------------------------------------
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        """One line instead of usage and message."""
+        self.exit(2, f"{self.prog}: {message}; see --help\n")
+
+
+def parse(arguments: Sequence[str], prog: str) -> argparse.Namespace:
+    """The command line as a namespace: recipe, base, out, quiet."""
+    parser = _Parser(
+        prog=prog,
+        description="Fill faces of a part with a tight hexagonal pattern of holes, as a recipe says.",
+        epilog=EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("recipe", type=Path, metavar="RECIPE.toml", help="what to make, see README.md")
+    parser.add_argument(
+        "--base",
+        type=Path,
+        metavar="MODEL",
+        help="the part: STL, OBJ, PLY, 3MF, GLB or .blend (default in Blender: the open file)",
+    )
+    parser.add_argument("--out", type=Path, metavar="DIR", required=True, help="folder for the results")
+    parser.add_argument("--quiet", action="store_true", help="no progress, errors only")
+    return parser.parse_args(arguments)
+
+
+def read_base(path: Path | None, in_blender: bool) -> LoadedBase:
+    """The base that the command line names; None is the file open in Blender."""
+    if path is None:
+        if not in_blender:
+            raise BaseError("No base is given: add --base MODEL")
+        return blender_side().read_base(None)
+    if path.suffix.lower() == ".blend":
+        if not path.exists():
+            raise BaseError(f"Base {path} does not exist: check the path")
+        return blender_side().read_base(path)
+    return load_base(path)
+
+
+def main(
+    arguments: Sequence[str],
+    prog: str = "pattern_batch.py",
+    report: Callable[[Progress], None] | None = None,
+    in_blender: bool = False,
+) -> int:
+    """Run the batch with these arguments; the exit code is 0 only when the part is good.
+
+    report: told of every progress step; by default a line on stderr. in_blender: a file may be open
+    """
+    try:
+        options = parse(arguments, prog)
+    except SystemExit as end:  # --help or a wrong command line: said already
+        return int(end.code or 0)
+    show = None if options.quiet else report or line_on(sys.stderr)
+    try:
+        load_recipe(options.recipe)  # nonsense is told before a long read
+        base = read_base(options.base, in_blender)
+        with output_folder(options.out) as folder:
+            run = drive(run_steps(base, options.recipe), show)
+            write_run(run, folder, blender_side)
+    except PatternError as error:
+        return _failed(prog, str(error), show)
+    except MemoryError:
+        return _failed(prog, "Out of memory: use a larger pitch or a coarser base", show)
+    except KeyboardInterrupt:
+        return _failed(prog, "Stopped, nothing was written", show, 130)
+    if show is not None:
+        show(Progress("Done", 1.0))
+    print(summary(run, options.out))
+    return 0
+
+
+def _failed(prog: str, message: str, show: Callable[[Progress], None] | None, code: int = 1) -> int:
+    if show is not None:
+        show(Progress("Done", 1.0))
+    print(f"{prog}: {' '.join(message.split())}", file=sys.stderr)
+    return code
+
+
+def summary(run: Run, out: Path) -> str:
+    """One line on what was made."""
+    figures = run.report
+    webs = "" if figures["min_web"] is None else f", smallest web {figures['min_web']:.3g}"
+    return (
+        f"{figures['features']:,} holes, {100 * figures['open_area']:.1f} % open{webs}; "
+        f"watertight part in {out / 'part.stl'}"
+    )
+
+
+def line_on(stream: IO[str]) -> Callable[[Progress], None]:
+    """A reporter that keeps one line of `stream` up to date; where that is no terminal, a line per stage."""
+    said = ""
+    terminal = stream.isatty()
+
+    def show(progress: Progress) -> None:
+        nonlocal said
+        if terminal:
+            text = "" if progress.stage == "Done" else f"{progress.stage} {100 * progress.fraction:.0f} %"
+            print(f"\r{text:<60}", end="\r" if not text else "", file=stream, flush=True)
+        elif progress.stage not in (said, "Done"):
+            print(f"{progress.stage} ...", file=stream, flush=True)
+        said = progress.stage
+
+    return show
