@@ -14,8 +14,8 @@ from scipy.spatial import Delaunay
 
 from .mesh import Floats, Ints, Mesh
 
-MANY = 12
-"""Holes in one triangle from which on it is split."""
+MANY = 150
+"""Holes in one triangle from which on it is split: with fewer, the pieces' edges cost more than they save."""
 PER_POINT = 8
 """Holes for each point at which a triangle is split."""
 
@@ -36,7 +36,7 @@ def split_crowded(mesh: Mesh, triangle: Ints, place: Floats, room: Floats) -> tu
     points, pieces, owners = [mesh.vertices], [], []
     count = len(mesh.vertices)
     split = np.zeros(len(mesh.triangles), dtype=bool)
-    # few: each of these triangles holds a dozen features or more
+    # few: each of these triangles holds at least MANY features
     for which, (start, end) in zip(crowded, bounds, strict=True):
         inner = place[picked[start:end]]
         piece = _pieces(mesh.corners[which], inner)
