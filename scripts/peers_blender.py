@@ -19,7 +19,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from bubble_pattern_addon.blender.part_mesh import build_part_mesh, read_original
+from bubble_pattern_addon.blender.part_mesh import build_part_mesh
+from bubble_pattern_addon.blender.provenance import read_original
 from bubble_pattern_addon.blender.reading import Base, evaluated_mesh, read_base
 from bubble_pattern_addon.core.mesh import Mesh
 from bubble_pattern_addon.core.pattern import Pattern

@@ -27,7 +27,7 @@ from ..core.recipe import Recipe, RegionChoice, default_recipe
 from ..core.region import Region, make_region
 from ..core.selection import select
 from ..core.solid import Part, part_steps
-from .part_mesh import Original, build_part_mesh, read_original
+from .part_mesh import build_part_mesh
 from .pattern_object import read_pattern, write_diameters, write_pattern
 from .preview_nodes import show_preview
 from .properties import (
@@ -40,6 +40,7 @@ from .properties import (
     recipe_text,
     take_recipe,
 )
+from .provenance import Original, read_original
 from .reading import Base, evaluated_mesh, read_base
 
 # A pattern that took longer than this is not laid anew at every change of a setting.

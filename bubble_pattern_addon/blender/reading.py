@@ -17,7 +17,7 @@ import numpy as np
 
 from ..core.errors import BaseError
 from ..core.mesh import Bools, Floats, Ints, Mesh
-from .attributes import face_masks, read_values
+from .attributes import MATERIAL, face_masks, read_named, read_values
 
 # A linear map that flattens volumes by more than this has lost a direction.
 SINGULAR = 1e-12
@@ -130,7 +130,7 @@ def transformed(points: Floats, matrix: Floats) -> Floats:
 
 def material_masks(obj: bpy.types.Object, mesh: bpy.types.Mesh, polygon: Ints) -> Mapping[str, Bools]:
     """Materials of the object by name, for the triangles that lie in the faces `polygon` (T,)."""
-    index = read_values(mesh.polygons, "material_index", np.int32)[polygon]
+    index = read_named(mesh, MATERIAL, len(mesh.polygons))[polygon]
     index = np.minimum(index, max(len(obj.material_slots) - 1, 0))
     masks: dict[str, Bools] = {}
     for row, slot in enumerate(obj.material_slots):

@@ -315,7 +315,7 @@ def test_applying_again_replaces_the_part() -> None:
 
 def test_removing_leaves_the_base_as_it_was() -> None:
     base = plate()
-    names = set(base.data.attributes.keys())
+    before = {attribute.name for attribute in base.data.attributes}
     add_on_top(base)
     apply()
     assert bpy.ops.bubble_pattern.remove() == {'FINISHED'}
@@ -323,9 +323,8 @@ def test_removing_leaves_the_base_as_it_was() -> None:
     assert list(bpy.data.meshes) == [base.data]
     assert not base.hide_get()
     assert not base.hide_render
-    assert {n for n in base.data.attributes if not n.startswith(".")} == {
-        n for n in names if not n.startswith(".")
-    }
+    after = {attribute.name for attribute in base.data.attributes}
+    assert {name for name in before ^ after if not name.startswith(".")} == set()
 
 
 def test_removing_can_keep_the_part() -> None:

@@ -15,7 +15,7 @@ import pytest
 
 pytest.importorskip("bpy", reason="needs the bpy module: python scripts/test.py --blender VERSION")
 
-from scripts import build_extension  # noqa: E402
+from scripts import build_extension
 
 ROOT = Path(__file__).resolve().parents[2]
 PLATFORMS = {
