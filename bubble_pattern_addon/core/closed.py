@@ -90,5 +90,7 @@ def signed_volumes(mesh: Mesh) -> Floats:
     the volume.
     """
     middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
-    a, b, c = (mesh.vertices - middle)[mesh.triangles].swapaxes(0, 1)
-    return np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
+    # a column per coordinate: several times faster than rows of three
+    x, y, z = np.ascontiguousarray((mesh.vertices - middle).T)
+    (ax, bx, cx), (ay, by, cy), (az, bz, cz) = (side[mesh.triangles.T] for side in (x, y, z))
+    return (ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)) / 6
