@@ -1,8 +1,12 @@
-"""A rendered view of a part, by Cycles on the CPU: that needs neither a window nor a graphics library."""
+"""A studio picture of a part: Cycles on the CPU, which needs neither a window nor a graphics library."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -11,121 +15,232 @@ from mathutils import Matrix, Vector
 from ..core.errors import OutputError
 from ..core.mesh import Floats
 from ..core.pattern import Pattern
+from .attributes import read_values
 
-SIZE = (1600, 1200)
-SAMPLES = 64
-LENS = 60.0  # mm
-SENSOR = 36.0  # mm
-PLASTIC = (0.42, 0.44, 0.46, 1.0)
-ROOM = 1.12  # how much wider than the part the picture is
-# The camera looks at the pattern from this far beside its normal, towards the part's longer side.
-ASIDE = 0.55
+SIZE = (1000, 750)
+SAMPLES = 32
+LENS = 70.0
+"""Focal length in millimetres on a sensor 36 wide: long enough to keep the part's proportions."""
+FLOOR = 60.0
+"""Width of the ground relative to the part's radius."""
 
 
-def render_part(path: Path, mesh: bpy.types.Mesh, matrix: Floats, pattern: Pattern) -> None:
-    """Render the part `mesh`, placed by `matrix` (4, 4), so that `pattern` (in world coordinates) is seen.
-
-    Raises OutputError where the picture cannot be written.
+@dataclass(frozen=True)
+class View:
+    """How the picture is taken: axes (3, 3) in rows right, up, towards the camera; the part's own up (3,);
+    the corners (n, 3) that must be in it.
     """
-    scene = bpy.data.scenes.new("Picture")
-    try:
-        part = bpy.data.objects.new("Part", mesh)
+
+    axes: Floats
+    ground: Floats
+    corners: Floats
+
+    @property
+    def centre(self) -> Floats:
+        """Middle of what is seen, (3,)."""
+        return (self.corners.max(axis=0) + self.corners.min(axis=0)) / 2
+
+    @property
+    def radius(self) -> float:
+        """Distance from the centre to the farthest corner."""
+        return float(np.linalg.norm(self.corners - self.centre, axis=1).max())
+
+
+def render_part(
+    path: Path, mesh: bpy.types.Mesh, matrix: Floats, pattern: Pattern, size: tuple[int, int] = SIZE
+) -> None:
+    """Render `mesh`, standing at `matrix` (4, 4), as a PNG at `path`: three-quarter view, the pattern on top.
+
+    The studio is a scene of its own, which is taken down again. Raises OutputError where rendering fails.
+    """
+    facing = pattern.normal.sum(axis=0)
+    if np.linalg.norm(facing) < 0.3 * len(pattern):  # a pattern all round has no side of its own
+        facing = np.array([0.0, 0.0, 1.0])
+    local = read_values(mesh.attributes["position"].data, "vector", np.float32, 3).astype(np.float64)
+    view = three_quarter_view(local @ matrix[:3, :3].T + matrix[:3, 3], facing)
+    with studio(view) as scene:
+        part = bpy.data.objects.new("Studio part", mesh)
         part.matrix_world = Matrix(matrix.tolist())
         scene.collection.objects.link(part)
         if not any(mesh.materials):
             mesh.materials.clear()
-            mesh.materials.append(plastic())
-        corners = np.array([list(part.matrix_world @ Vector(corner)) for corner in part.bound_box])
-        place_camera(scene, corners, pattern)
-        light(scene)
-        set_up(scene, path)
-        bpy.ops.render.render(write_still=True, scene=scene.name)
-    except RuntimeError as error:
-        raise OutputError(f"{path.name} can't be rendered: {str(error).removeprefix('Error: ')}") from None
-    finally:
-        bpy.data.scenes.remove(scene)
+            mesh.materials.append(make_material("Moulded", (0.05, 0.053, 0.058), roughness=0.38))
+        _camera(scene, view, size)
+        _settings(scene, path, size)
+        try:
+            bpy.ops.render.render(write_still=True, scene=scene.name)
+        except RuntimeError as error:
+            reason = str(error).removeprefix("Error: ").strip()
+            raise OutputError(f"{path.name} can't be rendered: {reason}") from None
     if not path.exists():
         raise OutputError(f"{path.name} can't be written: check the disk")
 
 
-def set_up(scene: bpy.types.Scene, path: Path) -> None:
-    """Cycles on the CPU, a PNG at `path`."""
-    render = scene.render
-    render.engine = 'CYCLES'
-    render.resolution_x, render.resolution_y = SIZE
-    render.resolution_percentage = 100
-    render.filepath = str(path.resolve())
-    render.image_settings.file_format = 'PNG'
-    scene.cycles.device = 'CPU'
-    scene.cycles.samples = SAMPLES
-    denoisers = scene.cycles.bl_rna.properties["denoiser"].enum_items
-    scene.cycles.use_denoising = 'OPENIMAGEDENOISE' in denoisers
+def three_quarter_view(corners: Floats, facing: Floats) -> View:
+    """From above the front right of a part with these corners (n, 3), lying with `facing` (3,) up."""
+    up = facing / np.linalg.norm(facing)
+    # the front is the side of the world's -Y, or of -Z for a part that faces along Y
+    front = np.array([0.0, -1.0, 0.0]) if abs(up[1]) < 0.7 else np.array([0.0, 0.0, -1.0])
+    front = front - (front @ up) * up
+    front /= np.linalg.norm(front)
+    right = np.cross(up, -front)
+    towards = 1.2 * up + 0.95 * front + 0.4 * right
+    towards /= np.linalg.norm(towards)
+    across = np.cross(up, towards)
+    across /= np.linalg.norm(across)
+    return View(np.stack([across, np.cross(towards, across), towards]), up, corners)
 
 
-def plastic() -> bpy.types.Material:
-    """A plain satin plastic, for parts without a material."""
-    material = bpy.data.materials.new("Plastic")
-    if bpy.app.version < (5, 0, 0):  # from 5.0 on every material has nodes
-        material.use_nodes = True
-    shader = material.node_tree.nodes["Principled BSDF"]
-    shader.inputs["Base Color"].default_value = PLASTIC
-    shader.inputs["Roughness"].default_value = 0.4
-    return material
+@contextmanager
+def studio(view: View) -> Iterator[bpy.types.Scene]:
+    """A scene with ground and lights, gone after the block with all objects and lights made meanwhile."""
+    kinds: tuple[Any, ...] = (bpy.data.scenes, bpy.data.objects, bpy.data.lights, bpy.data.cameras)
+    kinds += (bpy.data.worlds,)
+    before = [{item.as_pointer() for item in kind} for kind in kinds]
+    scene = bpy.data.scenes.new("Bubble Pattern Studio")
+    ground = _ground(view)
+    sheet, cover = ground.data, ground.data.materials[0]
+    try:
+        scene.world = _world()
+        scene.collection.objects.link(ground)
+        for light in _lights(view):
+            scene.collection.objects.link(light)
+        yield scene
+    finally:
+        for kind, known in zip(kinds, before, strict=True):
+            for item in [item for item in kind if item.as_pointer() not in known]:
+                kind.remove(item)
+        bpy.data.meshes.remove(sheet)
+        bpy.data.materials.remove(cover)
 
 
-def view_direction(corners: Floats, pattern: Pattern) -> tuple[Floats, Floats]:
-    """From the part to the camera, and what is up in the picture: unit vectors."""
-    normal = pattern.normal.mean(axis=0)
-    size = np.linalg.norm(normal)
-    normal = normal / size if size > 0.3 else np.array([0.0, 0.0, 1.0])  # all round: look from above
-    extent = np.ptp(corners, axis=0)
-    axis = np.eye(3)[np.argsort(extent)]  # from the shortest side of the part to the longest
-    aside = next(a for a in axis[::-1] if abs(a @ normal) < 0.8)
-    below = np.cross(aside, normal)
-    below /= np.linalg.norm(below)
-    if below[2] > 1e-6 or (abs(below[2]) <= 1e-6 and below[1] > 0):
-        below = -below
-    direction = normal + ASIDE * (0.45 * aside + below)
-    direction /= np.linalg.norm(direction)
-    up = -below - direction * (-below @ direction)
-    return direction, up / np.linalg.norm(up)
+def _world() -> bpy.types.World:
+    world = bpy.data.worlds.new("Studio")
+    if bpy.app.version < (5, 0, 0):  # from 5.0 on every world has nodes
+        world.use_nodes = True
+    background = next(node for node in world.node_tree.nodes if node.type == 'BACKGROUND')
+    background.inputs["Color"].default_value = (0.75, 0.82, 0.92, 1)
+    background.inputs["Strength"].default_value = 0.3
+    return world
 
 
-def place_camera(scene: bpy.types.Scene, corners: Floats, pattern: Pattern) -> None:
-    """A camera that sees all of the box `corners` (8, 3)."""
-    direction, up = view_direction(corners, pattern)
-    right = np.cross(up, direction)
-    center = corners.mean(axis=0)
-    across, high, near = ((corners - center) @ np.stack([right, up, direction], axis=1)).T
-    half = SENSOR / (2 * LENS)
-    ratio = SIZE[1] / SIZE[0]
-    distance = float(np.max(near + ROOM * np.maximum(np.abs(across) / half, np.abs(high) / (half * ratio))))
+def _ground(view: View) -> bpy.types.Object:
+    """A wide sheet under the part, bent up behind it in a large sweep so that there is no horizon."""
+    right, up = view.axes[0], view.ground
+    back = np.cross(up, right)
+    below = view.corners @ up
+    origin = view.centre + (below.min() - view.centre @ up - 0.002 * view.radius) * up
+    reach = FLOOR / 2 * view.radius
+    # the sweep starts some way behind the part
+    turn = np.linspace(0, np.pi / 2, 24)
+    start, bend = 2.2 * view.radius, 4 * view.radius
+    profile = [(-reach, 0.0), *zip(start + bend * np.sin(turn), bend * (1 - np.cos(turn)), strict=True)]
+    profile.append((start + bend, reach))
+    points = [
+        origin + side * reach * right + depth * back + height * up
+        for depth, height in profile
+        for side in (-1, 1)
+    ]
+    faces = [(2 * i, 2 * i + 1, 2 * i + 3, 2 * i + 2) for i in range(len(profile) - 1)]
+    mesh = bpy.data.meshes.new("Ground")
+    mesh.from_pydata([tuple(point) for point in points], [], faces)
+    mesh.shade_smooth()
+    mesh.materials.append(make_material("Ground", (0.30, 0.31, 0.33), roughness=0.55))
+    return bpy.data.objects.new("Ground", mesh)
+
+
+def _lights(view: View) -> list[bpy.types.Object]:
+    """A large soft key from the upper left, a strip from behind that draws the edges, a weak fill."""
+    right, up = view.axes[0], view.ground
+    back = np.cross(up, right)
+    # where from (right, back, up), width, height, brightness
+    plan = {
+        "Key": ((-1.7, 1.2, 2.4), 2.8, 2.0, 1.0),
+        "Strip": ((1.6, 2.8, 1.3), 0.5, 3.4, 1.1),
+        "Fill": ((1.6, -3.0, 1.6), 3.0, 1.6, 0.5),
+    }
+    lights = []
+    for name, ((aside, behind, above), width, height, brightness) in plan.items():
+        data = bpy.data.lights.new(name, 'AREA')
+        data.shape = 'RECTANGLE'
+        data.size, data.size_y = width * view.radius, height * view.radius
+        # the light that arrives falls with the square of the distance, which grows with the part
+        data.energy = 62.0 * brightness * view.radius**2
+        light = bpy.data.objects.new(name, data)
+        place = view.centre + view.radius * (aside * right + behind * back + above * up)
+        turned = Vector(view.centre - place).to_track_quat('-Z', 'Y').to_matrix().to_4x4()
+        light.matrix_world = Matrix.Translation(Vector(place)) @ turned
+        lights.append(light)
+    return lights
+
+
+def _camera(scene: bpy.types.Scene, view: View, size: tuple[int, int]) -> None:
+    """A camera that just sees all corners, with a little air around them."""
     data = bpy.data.cameras.new("Camera")
-    data.lens, data.sensor_width = LENS, SENSOR
-    data.clip_start, data.clip_end = distance * 1e-3, distance * 10
+    data.lens, data.sensor_width = LENS, 36.0
+    slope = np.array([18.0 / LENS, 18.0 / LENS * size[1] / size[0]]) * 0.90
+    seen = (view.corners - view.centre) @ view.axes.T
+    # with the camera at `far` along its axis, a corner is in the picture if |x - x0| <= slope (far - z)
+    low = (seen[:, :2] + slope * seen[:, 2:]).max(axis=0)
+    high = (-seen[:, :2] + slope * seen[:, 2:]).max(axis=0)
+    far = float(((low + high) / 2 / slope).max())
+    place = view.centre + (low - high) / 2 @ view.axes[:2] + far * view.axes[2]
+    data.clip_start, data.clip_end = far / 100, far + 2 * FLOOR * view.radius
     camera = bpy.data.objects.new("Camera", data)
     matrix = np.eye(4)
-    matrix[:3, 0], matrix[:3, 1], matrix[:3, 2] = right, up, direction
-    matrix[:3, 3] = center + direction * distance
+    matrix[:3, :3], matrix[:3, 3] = view.axes.T, place
     camera.matrix_world = Matrix(matrix.tolist())
     scene.collection.objects.link(camera)
     scene.camera = camera
 
 
-def light(scene: bpy.types.Scene) -> None:
-    """A large soft light beside the camera, a weaker one from behind, and a bright room."""
-    world = bpy.data.worlds.new("World")
-    if bpy.app.version < (5, 0, 0):
-        world.use_nodes = True
-    background = world.node_tree.nodes["Background"]
-    background.inputs["Color"].default_value = (0.8, 0.85, 0.9, 1.0)
-    background.inputs["Strength"].default_value = 0.35
-    scene.world = world
-    view = np.array(scene.camera.matrix_world)[:3, :3]
-    for name, along, strength in (("Key", (-0.7, 0.8, 0.5), 3.0), ("Rim", (0.9, 0.6, -0.2), 1.5)):
-        sun = bpy.data.lights.new(name, 'SUN')
-        sun.energy, sun.angle = strength, 0.3
-        lamp = bpy.data.objects.new(name, sun)
-        towards = Vector(view @ np.array(along))
-        lamp.matrix_world = towards.to_track_quat('Z', 'Y').to_matrix().to_4x4()
-        scene.collection.objects.link(lamp)
+def _settings(scene: bpy.types.Scene, path: Path, size: tuple[int, int]) -> None:
+    """Cycles on the CPU, a PNG at `path`."""
+    scene.render.engine = 'CYCLES'
+    scene.cycles.device = 'CPU'
+    scene.cycles.samples = SAMPLES
+    scene.cycles.use_adaptive_sampling = True
+    scene.cycles.adaptive_threshold = 0.03
+    denoisers = scene.cycles.bl_rna.properties["denoiser"].enum_items
+    scene.cycles.use_denoising = 'OPENIMAGEDENOISE' in denoisers
+    scene.cycles.max_bounces = 4
+    scene.render.resolution_x, scene.render.resolution_y = size
+    scene.render.resolution_percentage = 100
+    scene.render.image_settings.file_format = 'PNG'
+    scene.render.image_settings.color_mode = 'RGB'
+    scene.render.image_settings.compression = 90
+    scene.render.filepath = str(path.resolve())
+    scene.view_settings.view_transform = 'AgX'
+    scene.view_settings.look = 'AgX - Medium High Contrast'
+
+
+def make_material(
+    name: str,
+    color: tuple[float, float, float],
+    metallic: float = 0.0,
+    roughness: float = 0.4,
+    grain: float = 0.0,
+    grain_size: float = 1.0,
+) -> bpy.types.Material:
+    """A material of one colour; grain: height of a fine moulded texture, its size in the object's unit."""
+    material = bpy.data.materials.new(name)
+    if bpy.app.version < (5, 0, 0):  # from 5.0 on every material has nodes
+        material.use_nodes = True
+    material.diffuse_color = (*color, 1)
+    material.metallic, material.roughness = metallic, roughness
+    tree = material.node_tree
+    surface = next(node for node in tree.nodes if node.type == 'BSDF_PRINCIPLED')
+    surface.inputs["Base Color"].default_value = (*color, 1)
+    surface.inputs["Metallic"].default_value = metallic
+    surface.inputs["Roughness"].default_value = roughness
+    if grain > 0:
+        place = tree.nodes.new("ShaderNodeTexCoord")
+        noise = tree.nodes.new("ShaderNodeTexNoise")
+        bump = tree.nodes.new("ShaderNodeBump")
+        noise.inputs["Scale"].default_value = 1 / grain_size
+        noise.inputs["Detail"].default_value = 2.0
+        bump.inputs["Distance"].default_value = grain
+        tree.links.new(place.outputs["Object"], noise.inputs["Vector"])
+        tree.links.new(noise.outputs[0], bump.inputs["Height"])
+        tree.links.new(bump.outputs["Normal"], surface.inputs["Normal"])
+    return material
