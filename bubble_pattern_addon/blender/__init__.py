@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from . import operators, panels, properties, versioning
+from . import command, operators, panels, properties, versioning
 
-MODULES = (properties, operators, panels, versioning)
+MODULES = (properties, operators, panels, versioning, command)
 
 
 def register() -> None:

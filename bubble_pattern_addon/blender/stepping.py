@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import bpy
 
@@ -21,6 +21,11 @@ class SteppedOperator:
 
     def steps(self, context: bpy.types.Context) -> Steps[Any]:
         raise NotImplementedError
+
+    if TYPE_CHECKING:  # what the operator itself brings
+
+        def report(self, kind: set[str], message: str) -> None:
+            """Tell the user."""
 
     def done(self, context: bpy.types.Context, result: Any) -> None:
         """Tell the user what came out."""

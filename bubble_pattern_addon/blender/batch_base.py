@@ -1,0 +1,208 @@
+"""Blender's part in a batch run: a .blend as base, a .blend with the editable pattern as result.
+
+In a Blender without the extension, and in the plain `bpy` module, the add-on is registered for as long as it
+writes.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import bpy
+import numpy as np
+
+from ..core.errors import BaseError, OutputError
+from ..core.files import LoadedBase
+from ..core.mesh import Bools, Floats, Mesh
+from ..core.metric import Places
+from ..core.pattern import Pattern
+from ..core.quality import measure
+from .attributes import CORNER_VERTEX, MATERIAL, write_values
+from .generation import fill_settings, measured, place_part, put, read_source, verdict_of
+from .part_mesh import build_part_mesh
+from .pattern_object import new_pattern_object
+from .picture import render_part
+from .properties import is_pattern, recipe_of
+from .provenance import Original, read_original
+from .reading import Base, evaluated_mesh, transformed
+from .reading import read_base as read_object
+from .target_region import ATTRIBUTE, store
+
+if TYPE_CHECKING:
+    from ..batch import Run
+
+WORLD = np.eye(4)
+
+
+@dataclass(frozen=True)
+class BlendBase(LoadedBase):
+    """A base read from the .blend that is open; name: that of its object."""
+
+    name: str = ""
+
+
+@contextmanager
+def registered() -> Iterator[None]:
+    """Make sure that objects have the settings of a pattern, for as long as the block lasts."""
+    from . import register, unregister
+
+    if hasattr(bpy.types.Object, "bubble_pattern"):
+        yield
+        return
+    register()
+    try:
+        yield
+    finally:
+        unregister()
+
+
+# -- in ------------------------------------------------------------------------------------------------------
+
+
+def read_base(path: Path | None) -> LoadedBase:
+    """The base in a .blend file, with its modifiers and in world coordinates; None: in the file that is open.
+
+    Raises BaseError where the file is no .blend, or which of its objects is meant cannot be told.
+    """
+    if path is not None:
+        try:
+            bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False)
+        except RuntimeError as error:
+            reason = str(error).removeprefix("Error: ").strip()
+            raise BaseError(f"Base {path.name} is no .blend that this Blender can open: {reason}") from None
+    with registered():
+        obj = base_object()
+        with evaluated_mesh(obj, bpy.context.evaluated_depsgraph_get()) as mesh:
+            base = read_object(obj, mesh, WORLD)
+    return BlendBase(base.mesh, base.attributes, base.materials, obj.name)
+
+
+def base_object() -> bpy.types.Object:
+    """The object of the open file that is the base: the only visible mesh, or else the active one."""
+    meshes = [
+        obj
+        for obj in bpy.context.view_layer.objects
+        if obj.type == 'MESH' and obj.data.polygons and obj.visible_get() and not is_pattern(obj)
+    ]
+    active = bpy.context.view_layer.objects.active
+    if len(meshes) == 1:
+        return meshes[0]
+    if active in meshes:
+        return active
+    if not meshes:
+        raise BaseError("The .blend has no visible mesh object: show the part that is the base, and save")
+    names = ", ".join(f'"{obj.name}"' for obj in meshes[:5])
+    raise BaseError(f"The .blend has {len(meshes)} mesh objects ({names}): make the base active, and save")
+
+
+# -- out -----------------------------------------------------------------------------------------------------
+
+
+def write_blend(path: Path, run: Run) -> None:
+    """A .blend that opens with the base, the editable pattern and the part, the part shown.
+
+    Raises OutputError where it cannot be written.
+    """
+    with registered():
+        base_obj, base, original = stand_base(run)
+        region = run.recipe.region.attribute or ATTRIBUTE
+        if region not in base_obj.data.attributes:
+            mark(base_obj, region, base, run.selected)
+        source = read_source(base_obj, region, bpy.context)
+        pattern_obj = new_pattern_object(base_obj)
+        fill_settings(pattern_obj, base_obj, region, run.recipe)
+        start = time.perf_counter()
+        own = moved(run.pattern, np.linalg.inv(source.base.frame))
+        laid = measured(own, source.region, measure(own, source.region), start)
+        laid = replace(laid, seconds=run.report["seconds"]["pack"])
+        put(pattern_obj, source, recipe_of(pattern_obj.bubble_pattern), laid)
+        mesh = build_part_mesh(f"{base_obj.name} Part", run.part, run.pattern.places, base, original)
+        place_part(base_obj, [pattern_obj], mesh, verdict_of(run.part), bpy.context)
+        try:
+            bpy.ops.wm.save_as_mainfile(filepath=str(path.resolve()), compress=True, copy=True)
+        except RuntimeError as error:
+            raise OutputError(f"{path.name} can't be written: {str(error).removeprefix('Error: ')}") from None
+
+
+def write_picture(path: Path, run: Run) -> None:
+    """A rendered view of the part as PNG, looking at the pattern. Raises OutputError where that fails."""
+    with registered():
+        base_obj, base, original = stand_base(run)
+        mesh = build_part_mesh(f"{base_obj.name} Part", run.part, run.pattern.places, base, original)
+        render_part(path, mesh, np.array(base_obj.matrix_world), run.pattern)
+
+
+def stand_base(run: Run) -> tuple[bpy.types.Object, Base, Original]:
+    """The object of the run's base, made in a new file where the base is of no .blend, and how it reads."""
+    base = run.base
+    obj = bpy.data.objects[base.name] if isinstance(base, BlendBase) else new_file_with(base)
+    with evaluated_mesh(obj, bpy.context.evaluated_depsgraph_get()) as mesh:
+        read, original = read_object(obj, mesh, WORLD), read_original(obj, mesh)
+    # The part refers to the base as the file gave it, in double precision.
+    return obj, replace(read, mesh=base.mesh), original
+
+
+def new_file_with(base: LoadedBase) -> bpy.types.Object:
+    """An empty file with `base` as its only object, in millimeters."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    units = bpy.context.scene.unit_settings
+    units.system, units.scale_length, units.length_unit = 'METRIC', 0.001, 'MILLIMETERS'
+    obj = bpy.data.objects.new("Base", mesh_of(base.mesh))
+    bpy.context.scene.collection.objects.link(obj)
+    for name, mask in base.attributes.items():
+        write_values(obj.data, name, 'FACE', 'BOOLEAN', mask)
+    index = np.zeros(len(base.mesh.triangles), dtype=np.int32)
+    for row, (name, mask) in enumerate(base.materials.items()):
+        obj.data.materials.append(bpy.data.materials.new(name))
+        index[mask] = row
+    write_values(obj.data, MATERIAL, 'FACE', 'INT', index)
+    bpy.context.view_layer.update()
+    return obj
+
+
+def mesh_of(base: Mesh) -> bpy.types.Mesh:
+    """A Blender mesh of these triangles, row by row."""
+    mesh = bpy.data.meshes.new("Base")
+    mesh.vertices.add(len(base.vertices))
+    mesh.loops.add(base.triangles.size)
+    mesh.polygons.add(len(base.triangles))
+    write_values(mesh, "position", 'POINT', 'FLOAT_VECTOR', base.vertices)
+    write_values(mesh, CORNER_VERTEX, 'CORNER', 'INT', base.triangles)
+    mesh.polygons.foreach_set("loop_start", np.arange(0, base.triangles.size, 3, dtype=np.int32))
+    mesh.update(calc_edges=True)
+    return mesh
+
+
+def mark(obj: bpy.types.Object, region: str, base: Base, selected: Bools) -> None:
+    """Store the target region, triangles `selected` (T,), as a face attribute of the object's own mesh.
+
+    Modifiers that change the faces are applied first: which face an evaluated one stems from cannot be told.
+    """
+    faces = int(base.polygon.max()) + 1
+    if faces != len(obj.data.polygons):
+        graph = bpy.context.evaluated_depsgraph_get()
+        applied = bpy.data.meshes.new_from_object(
+            obj.evaluated_get(graph), preserve_all_data_layers=True, depsgraph=graph
+        )
+        obj.modifiers.clear()
+        obj.data = applied
+    marked = np.zeros(len(obj.data.polygons), dtype=bool)
+    marked[base.polygon[selected]] = True
+    store(obj, region, marked)
+
+
+def moved(pattern: Pattern, matrix: Floats) -> Pattern:
+    """`pattern` after the rigid motion `matrix` (4, 4)."""
+    turn = matrix[:3, :3].T
+    places = pattern.places
+    return replace(
+        pattern,
+        places=Places(transformed(places.position, matrix), places.triangle, places.barycentric),
+        normal=pattern.normal @ turn,
+        tangent=pattern.tangent @ turn,
+    )
