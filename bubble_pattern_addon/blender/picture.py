@@ -19,6 +19,8 @@ from .attributes import read_values
 
 SIZE = (1000, 750)
 SAMPLES = 32
+SECONDS = 40.0
+"""A slow machine stops here with fewer samples; the denoiser makes up for them."""
 LENS = 70.0
 """Focal length in millimetres on a sensor 36 wide: long enough to keep the part's proportions."""
 FLOOR = 60.0
@@ -204,6 +206,7 @@ def _settings(scene: bpy.types.Scene, path: Path, size: tuple[int, int]) -> None
     denoisers = scene.cycles.bl_rna.properties["denoiser"].enum_items
     scene.cycles.use_denoising = 'OPENIMAGEDENOISE' in denoisers
     scene.cycles.max_bounces = 4
+    scene.cycles.time_limit = SECONDS
     scene.render.resolution_x, scene.render.resolution_y = size
     scene.render.resolution_percentage = 100
     scene.render.image_settings.file_format = 'PNG'
