@@ -87,8 +87,9 @@ def grown(base: Mesh, start: int, max_angle: float) -> Bools:
     with np.errstate(invalid="ignore", divide="ignore"):
         normals = base.area_vectors / np.linalg.norm(base.area_vectors, axis=1, keepdims=True)
         cosine = (normals[pairs[:, 0]] * normals[pairs[:, 1]]).sum(axis=1)
-    # the slack lets max_angle = 0 reach all of a flat face, whose normals differ by rounding
-    pairs = pairs[cosine >= np.cos(np.radians(max_angle)) - 1e-9]
+    # the slack lets max_angle = 0 reach all of a flat face, whose normals differ by rounding; a triangle
+    # without area has no normal (nan) and is taken in: the region is refused for it rather than slit by it
+    pairs = pairs[~(cosine < np.cos(np.radians(max_angle)) - 1e-9)]
     count = len(base.triangles)
     links = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
     label = connected_components(links, directed=False)[1]
