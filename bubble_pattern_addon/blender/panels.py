@@ -108,7 +108,7 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
     ) -> None:
         """The pattern as it stands; its settings are in the panels below."""
         settings = obj.bubble_pattern
-        columns(layout).prop(settings, "base")
+        layout.label(text=settings.base.name, icon='OBJECT_DATA')
         if context.mode == 'EDIT_MESH':
             row = layout.row(align=True)
             row.operator("bubble_pattern.region_assign", text="Assign Region", icon='CHECKMARK')
@@ -134,7 +134,7 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
         if settings.verdict:
             sentences(layout, settings.verdict, context.region.width, 'ERROR')
         else:
-            layout.label(text="Checked: a watertight solid", icon='CHECKMARK')
+            layout.label(text=f"{settings.count:,} holes, watertight", icon='CHECKMARK')
         large(layout).operator("bubble_pattern.edit", icon='GREASEPENCIL')
         layout.operator("bubble_pattern.remove", icon='TRASH')
 
@@ -233,8 +233,9 @@ class BUBBLE_PATTERN_PT_result(SettingsPanel, bpy.types.Panel):
             figures.append(("Six Neighbors", f"{settings.six:.1%}", False))
         if settings.gap_min >= 0:
             figures.append(("Smallest Gap", f"{settings.gap_min:.2f} pitch", False))
+        table = self.layout.column(align=True)
         for name, figure, alert in figures:
-            split = self.layout.split(factor=0.5)
+            split = table.split(factor=0.5)
             left = split.row()
             left.alignment = 'RIGHT'
             left.label(text=name)

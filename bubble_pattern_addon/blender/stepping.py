@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import bpy
@@ -14,6 +15,27 @@ from ..core.progress import Progress, Steps, drive
 SLICE = 0.08
 # Work that ends within this time never becomes modal: the redo panel works, and nothing flickers.
 PATIENCE = 0.4
+
+
+def status_of(shown: Latest) -> Callable[[bpy.types.Header, bpy.types.Context], None]:
+    """A function that draws progress in the status bar; a bound method Blender would not take."""
+
+    def draw(header: bpy.types.Header, _context: bpy.types.Context) -> None:
+        progress = shown.latest
+        row = header.layout.row(align=True)
+        bar = row.row()
+        bar.ui_units_x = 14
+        bar.progress(factor=min(max(progress.fraction, 0.0), 1.0), text=progress.stage)
+        row.separator()
+        row.label(text="Cancel", icon='EVENT_ESC')
+
+    return draw
+
+
+class Latest:
+    """The latest step of some work; it outlives the operator, which may be freed before the last redraw."""
+
+    latest = Progress("Working", 0.0)
 
 
 class SteppedOperator:
@@ -42,13 +64,14 @@ class SteppedOperator:
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         """Work with progress in the status bar; Esc cancels."""
         self._running = self.steps(context)
+        self._shown = Latest()
         outcome = self.advance(context, PATIENCE)
         if outcome is not None:
             return outcome
         manager = context.window_manager
         self._timer = manager.event_timer_add(0.01, window=context.window)
         context.window.cursor_modal_set('WAIT')
-        context.workspace.status_text_set(self.draw_status)
+        context.workspace.status_text_set(status_of(self._shown))
         manager.modal_handler_add(self)
         return {'RUNNING_MODAL'}
 
@@ -63,7 +86,7 @@ class SteppedOperator:
             if outcome is not None:
                 self.tidy(context)
                 return outcome
-            context.workspace.status_text_set(self.draw_status)
+            context.workspace.status_text_set(status_of(self._shown))
         return {'RUNNING_MODAL'}
 
     def cancel(self, context: bpy.types.Context) -> None:
@@ -76,7 +99,7 @@ class SteppedOperator:
         until = time.perf_counter() + seconds
         try:
             while time.perf_counter() < until:
-                self._progress = next(self._running)
+                self._shown.latest = next(self._running)
         except StopIteration as end:
             self.done(context, end.value)
             return {'FINISHED'}
@@ -92,16 +115,6 @@ class SteppedOperator:
         """Report what the user can mend."""
         self.report({'ERROR'}, str(error))
         return {'CANCELLED'}
-
-    def draw_status(self, header: bpy.types.Header, _context: bpy.types.Context) -> None:
-        """The status bar while the work goes on."""
-        progress = getattr(self, "_progress", Progress("Working", 0.0))
-        row = header.layout.row(align=True)
-        bar = row.row()
-        bar.ui_units_x = 14
-        bar.progress(factor=min(max(progress.fraction, 0.0), 1.0), text=progress.stage)
-        row.separator()
-        row.label(text="Cancel", icon='EVENT_ESC')
 
     def tidy(self, context: bpy.types.Context) -> None:
         """Take timer, cursor and status text back."""

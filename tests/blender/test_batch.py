@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="needs the bpy module: python scripts/test.py --blender VERSION")
 
 from bubble_pattern_addon import batch  # noqa: E402
-from bubble_pattern_addon.blender import command, properties  # noqa: E402
+from bubble_pattern_addon.blender import batch_base, command, properties  # noqa: E402
 from bubble_pattern_addon.core.files import write_mesh  # noqa: E402
 from bubble_pattern_addon.core.mesh import Mesh  # noqa: E402
 
@@ -102,7 +103,8 @@ def test_the_open_file_is_the_base_of_the_command(tmp_path: Path) -> None:
     assert (out / "part.stl").exists()
 
 
-def test_a_mesh_file_becomes_an_editable_blend(tmp_path: Path) -> None:
+def test_a_mesh_file_becomes_an_editable_blend(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(batch_base, "render_part", partial(batch_base.render_part, size=(120, 90)))
     x, y, z = 80.0, 60.0, 4.0
     corners = np.array([[i, j, k] for k in (0, z) for j in (0, y) for i in (0, x)])
     quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
