@@ -164,7 +164,7 @@ def _bring_up_to_date(folder: Path, python: Path, blender: str, groups: Sequence
     stamp_file = folder / "bubble-pattern.json"
     stamp = {
         "pyproject": hashlib.sha256(PYPROJECT.read_bytes()).hexdigest(),
-        "python": str(python),
+        "python": BLENDERS[blender],
         "blender": blender,
     }
     try:
