@@ -118,6 +118,7 @@ def shown() -> Any:
         bar.n = round(100 * progress.fraction)
         bar.refresh()
 
+    @bpy.app.handlers.persistent  # it shall outlive the files that are opened
     def rendering(stats: Any, *_: Any) -> None:
         sample = re.search(r"Sample (\d+)/(\d+)", str(stats))
         if sample:
