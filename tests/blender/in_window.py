@@ -97,8 +97,7 @@ def story() -> Iterator[float]:
     found["features"] = pattern.bubble_pattern.count
     yield 0.5
     tab()
-    shot(".pattern")
-    yield 2.0
+    yield 0.5
 
     fine = base.modifiers.new("Fine", 'SUBSURF')
     fine.levels = 2
@@ -129,13 +128,6 @@ def story() -> Iterator[float]:
     yield 0.5
     tab()
     yield 1.0
-
-
-def shot(suffix: str) -> None:
-    """Save what the window shows beside the last picture."""
-    main, area = window()
-    with bpy.context.temp_override(window=main, area=area):
-        bpy.ops.screen.screenshot(filepath=str(Path(picture).with_suffix(suffix + ".png")))
 
 
 def finish() -> None:
