@@ -125,7 +125,7 @@ BAD = {
     "missing.stl": (None, "does not exist"),
     "part.step": (b"ISO-10303-21;", "suffix that is not known: save it as STL"),
     "words.stl": (b"this is no mesh at all, only words", "words.stl"),
-    "short.stl": (bytes(80) + b"\xff\x00\x00\x00" + bytes(50), "no STL mesh"),
+    "short.stl": (bytes(80) + b"\xff\x00\x00\x00" + bytes(50), "short.stl"),
     "empty.stl": (b"", "empty.stl"),
     "solid.stl": (b"solid nothing\nendsolid nothing\n", "solid.stl"),
     "words.obj": (b"this is no mesh at all", "holds no faces"),
