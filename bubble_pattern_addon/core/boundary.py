@@ -1,0 +1,69 @@
+"""How far places on the region are from its boundary."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from .mesh import Floats, Ints
+from .region import Region
+
+# Nearest samples whose segments are measured exactly; two segments meet at a corner, a sheet's fold may add some more.
+CANDIDATES = 4
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """The boundary of a region, ready to be asked for distances.
+
+    segments: (S, 2, 3) with the region on the left; owner: (K,) segment of each sample in `tree`; reach: the length
+    over which two sheets of the region may face each other without being confused
+    """
+
+    segments: Floats
+    owner: Ints
+    tree: cKDTree
+    reach: float
+
+
+def make_boundary(region: Region, spacing: float) -> Boundary | None:
+    """Index of the region's boundary with samples no farther apart than `spacing`; None where it has no boundary."""
+    if not len(region.rim):
+        return None
+    segments = region.boundary_segments
+    length = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)
+    number = np.maximum(np.ceil(length / spacing).astype(np.int64), 1)
+    owner = np.repeat(np.arange(len(segments)), number)
+    share = (np.arange(len(owner)) - np.repeat(np.cumsum(number) - number, number) + 0.5) / number[owner]
+    points = segments[owner, 0] + share[:, None] * (segments[owner, 1] - segments[owner, 0])
+    row = region.rim[owner, 0]
+    reach = 8 * spacing
+    tree = cKDTree(signature(points, region.normals[row], region.sheet[row], reach))
+    return Boundary(segments, owner, tree, reach)
+
+
+def signature(points: Floats, normals: Floats, sheet: Ints, reach: float) -> Floats:
+    """Coordinates (n, 7) in which places on different sheets are far apart although they touch in space.
+
+    Normals count with the length `reach`, so that both sides of a wall thinner than that are kept apart; parts of the
+    region that are not connected are moved out of one another's sight.
+    """
+    apart = 1e3 * max(reach, float(np.ptp(points, axis=0).max(initial=0.0)))
+    return np.concatenate([points, reach * normals, apart * sheet[:, None]], axis=1)
+
+
+def nearest_boundary(boundary: Boundary, points: Floats, normals: Floats, sheet: Ints) -> tuple[Floats, Floats]:
+    """Distance (n,) to the nearest boundary segment of the same sheet, and the nearest point on it (n, 3)."""
+    count = min(CANDIDATES, len(boundary.owner))
+    _, near = boundary.tree.query(signature(points, normals, sheet, boundary.reach), k=count)
+    ends = boundary.segments[boundary.owner[near.reshape(len(points), count)]]
+    start, along = ends[..., 0, :], ends[..., 1, :] - ends[..., 0, :]
+    offset = points[:, None] - start
+    share = np.einsum("nkc,nkc->nk", offset, along) / np.maximum(np.einsum("nkc,nkc->nk", along, along), 1e-300)
+    foot = start + np.clip(share, 0, 1)[..., None] * along
+    distance = np.linalg.norm(points[:, None] - foot, axis=2)
+    best = distance.argmin(axis=1)
+    pick = np.arange(len(points))
+    return distance[pick, best], foot[pick, best]

@@ -1,0 +1,182 @@
+"""The target region: the selected triangles of the base as a surface with its own boundary."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from .errors import RegionError
+from .mesh import Bools, Floats, Ints, Mesh
+
+# A triangle is flat when its height is below this share of its longest edge: walking over it would divide by zero.
+FLAT = 1e-12
+
+
+@dataclass(frozen=True)
+class Region:
+    """Target region on a base geometry.
+
+    base: the whole base, vertices welded where they coincide exactly (triangles keep their rows)
+    triangles: (R,) rows of base.triangles that belong to the region, ascending
+    neighbours: (R, 3) region row across the edge opposite to each corner, -1 at the boundary
+    opposite: (R, 3) the corner of that neighbour which lies opposite to the shared edge
+    sheet: (R,) label of the connected part a triangle belongs to
+    loops: boundary loops as rows of base vertices, the region on the left of each edge
+    rim: (S, 2) every boundary edge as (region row, opposite corner), in the order of the loops
+    """
+
+    base: Mesh
+    triangles: Ints
+    neighbours: Ints
+    opposite: Ints
+    sheet: Ints
+    loops: tuple[Ints, ...]
+    rim: Ints
+
+    @cached_property
+    def corners(self) -> Floats:
+        """Corner positions of the region's triangles, (R, 3, 3)."""
+        return self.base.vertices[self.base.triangles[self.triangles]]
+
+    @cached_property
+    def area_vectors(self) -> Floats:
+        """Outward normals as long as twice the area, (R, 3)."""
+        corners = self.corners
+        return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+    @cached_property
+    def normals(self) -> Floats:
+        """Outward unit normals of the triangles, (R, 3)."""
+        return self.area_vectors / np.linalg.norm(self.area_vectors, axis=1, keepdims=True)
+
+    @cached_property
+    def area(self) -> float:
+        """Surface area of the region."""
+        return float(np.linalg.norm(self.area_vectors, axis=1).sum() / 2)
+
+    @cached_property
+    def boundary_segments(self) -> Floats:
+        """Start and end of every boundary edge, the region on the left, (S, 2, 3)."""
+        if not len(self.rim):
+            return np.empty((0, 2, 3))
+        row, corner = self.rim.T
+        ends = np.stack([(corner + 1) % 3, (corner + 2) % 3], axis=1)
+        return self.corners[row[:, None], ends]
+
+
+def make_region(base: Mesh, selected: Bools) -> Region:
+    """Region made of the `selected` (T,) triangles of `base`.
+
+    Edges that more than two region triangles share, or that two of them run along in the same direction, count as
+    boundary: bubbles do not cross them.
+
+    Raises RegionError where nothing is selected, a coordinate is not a number or a triangle has no area.
+    """
+    triangles = np.flatnonzero(selected)
+    if not len(triangles):
+        raise RegionError("The target region is empty: select at least one face.")
+    welded = weld(base)
+    _check_geometry(welded, triangles)
+    rows = welded.triangles[triangles]
+    neighbours, opposite = _adjacency(rows)
+    loops, rim = _boundary_loops(rows, neighbours, opposite)
+    return Region(welded, triangles, neighbours, opposite, _sheets(neighbours), loops, rim)
+
+
+def weld(mesh: Mesh) -> Mesh:
+    """The same triangles on vertices that are unique by position; rows of `triangles` keep their order."""
+    # Sorting one opaque key per vertex is several times faster than np.unique(axis=0); adding 0.0 makes -0.0 equal 0.0.
+    keys = np.ascontiguousarray(mesh.vertices + 0.0).view(np.dtype((np.void, 24))).ravel()
+    _, first, inverse = np.unique(keys, return_index=True, return_inverse=True)
+    if len(first) == len(keys):
+        return mesh
+    order = np.sort(first)
+    rank = np.searchsorted(order, first)
+    return Mesh(mesh.vertices[order], rank[inverse.reshape(-1)][mesh.triangles])
+
+
+def _check_geometry(base: Mesh, triangles: Ints) -> None:
+    corners = base.vertices[base.triangles[triangles]]
+    bad = ~np.isfinite(corners).all(axis=(1, 2))
+    if bad.any():
+        raise RegionError(
+            f"{_count(bad, 'face')} of the target region has a coordinate that is not a number (first: face "
+            f"{triangles[bad][0]}): repair or delete these faces."
+        )
+    edges = corners - np.roll(corners, 1, axis=1)
+    longest = (edges**2).sum(axis=2).max(axis=1)
+    twice_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+    flat = twice_area <= FLAT * longest
+    if flat.any():
+        at = corners[flat][0].mean(axis=0)
+        raise RegionError(
+            f"{_count(flat, 'face')} of the target region has no area (first: near {at[0]:.6g}, {at[1]:.6g}, "
+            f"{at[2]:.6g}): merge its vertices by distance or leave it out of the selection."
+        )
+
+
+def _count(bad: Bools, noun: str) -> str:
+    number = int(bad.sum())
+    return f"One {noun}" if number == 1 else f"Each of {number} {noun}s"
+
+
+def _adjacency(rows: Ints) -> tuple[Ints, Ints]:
+    """Neighbour and opposite corner across the edge opposite to each corner, both (R, 3)."""
+    start, end = np.roll(rows, -1, axis=1).ravel(), np.roll(rows, -2, axis=1).ravel()
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    order = np.lexsort((high, low))
+    same = (np.diff(low[order]) == 0) & (np.diff(high[order]) == 0)
+    group = np.concatenate([[0], np.cumsum(~same)])
+    pair = np.flatnonzero(same & (np.bincount(group)[group[:-1]] == 2))
+    one, two = order[pair], order[pair + 1]
+    facing = start[one] == end[two]
+    one, two = one[facing], two[facing]
+    neighbours = np.full(rows.size, -1)
+    opposite = np.full(rows.size, -1)
+    neighbours[one], neighbours[two] = two // 3, one // 3
+    opposite[one], opposite[two] = two % 3, one % 3
+    return neighbours.reshape(-1, 3), opposite.reshape(-1, 3)
+
+
+def _sheets(neighbours: Ints) -> Ints:
+    row, corner = np.nonzero(neighbours >= 0)
+    links = coo_matrix((np.ones(len(row)), (row, neighbours[row, corner])), shape=(len(neighbours),) * 2)
+    return connected_components(links, directed=False)[1].astype(np.int64)
+
+
+def _boundary_loops(rows: Ints, neighbours: Ints, opposite: Ints) -> tuple[tuple[Ints, ...], Ints]:
+    """Boundary edges chained into loops: vertex rows per loop, and all edges as (row, opposite corner) in loop order."""
+    row, corner = np.nonzero(neighbours < 0)
+    following = _next_boundary_edge(row, corner, neighbours, opposite)
+    number = np.full(neighbours.shape, -1)
+    number[row, corner] = np.arange(len(row))
+    after = number[following].tolist()
+    seen = [False] * len(row)
+    loops: list[Ints] = []
+    order: list[int] = []
+    for first in range(len(row)):
+        loop: list[int] = []
+        at = first
+        while not seen[at]:
+            seen[at] = True
+            loop.append(at)
+            at = after[at]
+        if loop:
+            loops.append(rows[row[loop], (corner[loop] + 1) % 3])
+            order.extend(loop)
+    return tuple(loops), np.stack([row, corner], axis=1)[order]
+
+
+def _next_boundary_edge(row: Ints, corner: Ints, neighbours: Ints, opposite: Ints) -> tuple[Ints, Ints]:
+    """The boundary edge that leaves where each given one ends, found by turning round that vertex inside the region."""
+    row, corner = row.copy(), (corner + 1) % 3  # the next edge of the same triangle starts where this one ends
+    turning = np.flatnonzero(neighbours[row, corner] >= 0)
+    while len(turning):
+        r, c = row[turning], corner[turning]
+        row[turning], corner[turning] = neighbours[r, c], (opposite[r, c] + 1) % 3
+        turning = turning[neighbours[row[turning], corner[turning]] >= 0]
+    return row, corner
