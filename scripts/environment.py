@@ -380,7 +380,7 @@ def borrow(libraries: Sequence[str]) -> None:
                 marker.touch()
     except (EnvironmentProblem, OSError) as problem:
         sys.exit(
-            f"{Path(__file__).name}: Blender lacks {', '.join(libraries)}, and they can't be installed "
+            f"pattern_batch.py: Blender lacks {', '.join(libraries)}, and they can't be installed "
             f"({problem}): install the Bubble Pattern extension in Blender, which brings them"
         )
     inside = "Lib/site-packages" if os.name == "nt" else f"lib/python{version}/site-packages"
