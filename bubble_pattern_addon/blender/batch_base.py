@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from ..batch import Run
 
 WORLD = np.eye(4)
+# Edges that bend by more than this many degrees are shaded sharp on a base that is of no .blend.
+SHARP = 30.0
 
 
 @dataclass(frozen=True)
@@ -153,6 +155,7 @@ def new_file_with(base: LoadedBase) -> bpy.types.Object:
     units = bpy.context.scene.unit_settings
     units.system, units.scale_length, units.length_unit = 'METRIC', 0.001, 'MILLIMETERS'
     obj = bpy.data.objects.new("Base", mesh_of(base.mesh))
+    obj.data.set_sharp_from_angle(angle=np.radians(SHARP))  # such files say nothing of shading
     bpy.context.scene.collection.objects.link(obj)
     for name, mask in base.attributes.items():
         write_values(obj.data, name, 'FACE', 'BOOLEAN', mask)

@@ -282,7 +282,7 @@ def test_help_shows_an_example(tmp_path: Path) -> None:
 # -- real parts ----------------------------------------------------------------------------------------------
 
 PARTS = {
-    # a vent in the cover's roof: the wall behind it stays whole
+    # round the display's window: the near wall only
     "LCD-cover-ORIGINAL-MK3.stl": "[region]\nnear = [0, 20, 26]\n[packing]\npitch = 4\n",
     # dimples under the knob
     "LCD-knob.stl": "[region]\nnear = [2.4, 4.9, 1]\n[packing]\npitch = 2\n[feature]\ndepth = 0.5\n",
