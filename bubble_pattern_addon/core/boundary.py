@@ -16,12 +16,13 @@ CANDIDATES = 4
 
 @dataclass(frozen=True)
 class Boundary:
-    """The boundary of a region, ready to be asked for distances.
+    """The boundary of a `region`, ready to be asked for distances.
 
     segments: (S, 2, 3) with the region on the left; owner: (K,) segment of each sample in `tree`; reach: the length
     over which two sheets of the region may face each other without being confused
     """
 
+    region: Region
     segments: Floats
     owner: Ints
     tree: cKDTree
@@ -40,24 +41,27 @@ def make_boundary(region: Region, spacing: float) -> Boundary | None:
     points = segments[owner, 0] + share[:, None] * (segments[owner, 1] - segments[owner, 0])
     row = region.rim[owner, 0]
     reach = 8 * spacing
-    tree = cKDTree(signature(points, region.normals[row], region.sheet[row], reach))
-    return Boundary(segments, owner, tree, reach)
+    tree = cKDTree(signature(region, points, row, reach))
+    return Boundary(region, segments, owner, tree, reach)
 
 
-def signature(points: Floats, normals: Floats, sheet: Ints, reach: float) -> Floats:
+def signature(region: Region, points: Floats, row: Ints, reach: float) -> Floats:
     """Coordinates (n, 7) in which places on different sheets are far apart although they touch in space.
 
-    Normals count with the length `reach`, so that both sides of a wall thinner than that are kept apart; parts of the
+    points: (n, 3) on the triangles `row` (n,). Normals count with the length `reach`, so that both sides of a wall thinner than that are kept apart; parts of the
     region that are not connected are moved out of one another's sight.
     """
-    apart = 1e3 * max(reach, float(np.ptp(points, axis=0).max(initial=0.0)))
-    return np.concatenate([points, reach * normals, apart * sheet[:, None]], axis=1)
+    apart = 1e3 * (region.extent + reach) * region.sheet[row]
+    return np.concatenate([points, reach * region.normals[row], apart[:, None]], axis=1)
 
 
-def nearest_boundary(boundary: Boundary, points: Floats, normals: Floats, sheet: Ints) -> tuple[Floats, Floats]:
-    """Distance (n,) to the nearest boundary segment of the same sheet, and the nearest point on it (n, 3)."""
+def nearest_boundary(boundary: Boundary, points: Floats, row: Ints) -> tuple[Floats, Floats]:
+    """Distance (n,) to the nearest boundary segment of the same sheet, and the nearest point on it (n, 3).
+
+    points: (n, 3) on the triangles `row` (n,)
+    """
     count = min(CANDIDATES, len(boundary.owner))
-    _, near = boundary.tree.query(signature(points, normals, sheet, boundary.reach), k=count)
+    _, near = boundary.tree.query(signature(boundary.region, points, row, boundary.reach), k=count)
     ends = boundary.segments[boundary.owner[near.reshape(len(points), count)]]
     start, along = ends[..., 0, :], ends[..., 1, :] - ends[..., 0, :]
     offset = points[:, None] - start

@@ -59,6 +59,18 @@ class Region:
         return float(np.linalg.norm(self.area_vectors, axis=1).sum() / 2)
 
     @cached_property
+    def extent(self) -> float:
+        """Longest side of the region's bounding box."""
+        return float(np.ptp(self.corners.reshape(-1, 3), axis=0).max())
+
+    @cached_property
+    def single_sheet(self) -> bool:
+        """Whether the region is one piece whose normals all lie in one cone: no part of it can face another."""
+        mean = self.area_vectors.sum(axis=0)
+        length = np.linalg.norm(mean)
+        return bool(self.sheet.max() == 0 and length > 0 and (self.normals @ mean).min() > 0.7 * length)
+
+    @cached_property
     def boundary_segments(self) -> Floats:
         """Start and end of every boundary edge, the region on the left, (S, 2, 3)."""
         if not len(self.rim):

@@ -20,6 +20,8 @@ Complex = NDArray[np.complex128]
 
 # How far outside a triangle, as a share of its height, still counts as inside: far below any length that matters.
 INSIDE = -1e-12
+# Faces that turn by more than this meet in an edge, not in a smooth surface.
+CREASE = np.radians(35.0)
 
 
 @dataclass(frozen=True)
@@ -137,3 +139,33 @@ def walk(charts: Charts, start: Spots, steps: Complex, carried: Complex | None =
         row[active], bary[active], left[active] = beyond, crossed, step[pick] * turn
         carried[active] *= turn
     return Walk(Spots(row, bary), carried, left)
+
+
+def smooth_normals(region: Region, spots: Spots) -> Floats:
+    """Outward unit normals (n, 3) of the surface that the triangles stand for.
+
+    Interpolated between corner normals, each the mean (weighted by area) of the triangles round that vertex that turn by
+    less than CREASE from this one: a tessellated curve is smooth, an edge stays an edge.
+    """
+    corner_normals = _corner_normals(region)
+    normal = np.einsum("nk,nkc->nc", spots.barycentric, corner_normals[spots.row])
+    return normal / np.linalg.norm(normal, axis=1, keepdims=True)
+
+
+def _corner_normals(region: Region) -> Floats:
+    vertices = region.base.triangles[region.triangles].ravel()
+    vertex, corner_of = np.unique(vertices, return_inverse=True)
+    corner_of = corner_of.reshape(-1)
+    order = np.argsort(corner_of, kind="stable")
+    count = np.bincount(corner_of, minlength=len(vertex))
+    start = np.cumsum(count) - count
+    # Every corner meets all corners at its vertex, itself among them.
+    own = np.repeat(np.arange(len(vertices)), count[corner_of])
+    turn = np.arange(len(own)) - np.repeat(np.cumsum(count[corner_of]) - count[corner_of], count[corner_of])
+    other = order[start[corner_of[own]] + turn]
+    normals = region.normals
+    smooth = np.einsum("mc,mc->m", normals[own // 3], normals[other // 3]) > np.cos(CREASE)
+    own, other = own[smooth], other[smooth]
+    weighted = region.area_vectors[other // 3]
+    total = np.stack([np.bincount(own, axis, len(vertices)) for axis in weighted.T], axis=1)
+    return (total / np.linalg.norm(total, axis=1, keepdims=True)).reshape(-1, 3, 3)

@@ -51,10 +51,10 @@ class FirstRow:
     top: Floats
     around: Floats
 
-    def wrapped(self, arc: Floats) -> Floats:
-        """The same arcs brought back onto their lines."""
-        arc = np.where(arc > self.top, arc - self.around, arc)
-        return np.where(arc < self.top - self.around, arc + self.around, arc)
+    def wrapped(self) -> Floats:
+        """The arcs brought back onto their lines, (n,): a bubble may have slid past the end of a closed one."""
+        beyond = np.floor((self.top - self.arc) / np.where(self.around > 0, self.around, 1.0))
+        return np.where(self.around > 0, self.arc + beyond * self.around, self.arc)
 
 
 def inset_track(charts: Charts, boundary: Boundary, pitch: Lengths, edge_offset: float) -> Track:
@@ -112,8 +112,7 @@ def _on_edges(row: Ints, corner: Ints, share: Floats) -> Spots:
 
 
 def _to_boundary(charts: Charts, boundary: Boundary, spots: Spots) -> tuple[Floats, Floats]:
-    region = charts.region
-    return nearest_boundary(boundary, positions(charts, spots), region.normals[spots.row], region.sheet[spots.row])
+    return nearest_boundary(boundary, positions(charts, spots), spots.row)
 
 
 def _settled(charts: Charts, boundary: Boundary, radius: Lengths, spots: Spots, rounds: int = 3) -> Spots:

@@ -1,0 +1,71 @@
+"""The bubbles while they are packed: those of the first row on their track, the others free on the surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..boundary import Boundary
+from ..mesh import Floats, Ints
+from ..surface import Charts, Spots, positions, to_frame, walk
+from .rim import FirstRow, Lengths, Track, on_track, spots_on_track
+
+
+@dataclass(frozen=True)
+class Ground:
+    """What bubbles are packed on: the surface, its boundary (None where there is none), the first row's track, the
+    packing metric at places and the edge offset."""
+
+    charts: Charts
+    boundary: Boundary | None
+    track: Track
+    pitch: Lengths
+    edge_offset: float
+
+
+@dataclass(frozen=True)
+class Bubbles:
+    """first_row: m bubbles on the track; free: places of the k others. Arrays over all bubbles have the first row first."""
+
+    first_row: FirstRow
+    free: Spots
+
+    def __len__(self) -> int:
+        return len(self.first_row.arc) + len(self.free.row)
+
+
+def all_spots(ground: Ground, bubbles: Bubbles) -> Spots:
+    """Places of all bubbles, exactly on the surface."""
+    if not len(bubbles.first_row.arc):
+        return bubbles.free
+    rim = spots_on_track(ground.charts, ground.track, bubbles.first_row.wrapped())
+    return Spots(
+        np.concatenate([rim.row, bubbles.free.row]), np.concatenate([rim.barycentric, bubbles.free.barycentric])
+    )
+
+
+def points_and_rows(ground: Ground, bubbles: Bubbles) -> tuple[Floats, Ints, Floats]:
+    """Points (n, 3), region rows (n,) and the first row's unit tangents (m, 3).
+
+    The first row's points are read off the track's chords, which is exact enough to feel forces by and quick.
+    """
+    free = positions(ground.charts, bubbles.free)
+    if not len(bubbles.first_row.arc):
+        return free, bubbles.free.row, np.empty((0, 3))
+    rim, tangent, knot = on_track(ground.track, bubbles.first_row.wrapped())
+    return (
+        np.concatenate([rim, free]),
+        np.concatenate([ground.track.spots.row[knot], bubbles.free.row]),
+        tangent,
+    )
+
+
+def moved(ground: Ground, bubbles: Bubbles, steps: Floats, tangent: Floats, pitch: Floats) -> Bubbles:
+    """The bubbles after `steps` (n, 3): the first row slides along its track, the others walk on the surface."""
+    row = bubbles.first_row
+    m = len(row.arc)
+    arc = np.clip(row.arc + np.einsum("mc,mc->m", steps[:m], tangent) / pitch[:m], row.low, row.high)
+    free, charts = bubbles.free, ground.charts
+    arrived = walk(charts, free, to_frame(charts, free.row, steps[m:])).arrived
+    return Bubbles(replace(row, arc=arc), arrived)

@@ -1,0 +1,140 @@
+"""A hexagonal lattice grown over the surface: where the bubbles start.
+
+From random points the force law makes grains; the look of the paper, one crystal in the core and all defects in the rim,
+needs a crystal to start from. On a surface without a plane it grows outward: every bubble of the front sends a step of one
+pitch into each of six directions, the directions are carried along straight walks, and what several bubbles propose for one
+place is averaged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from ..boundary import signature
+from ..mesh import Floats
+from ..surface import Charts, Complex, Spots, positions, to_frame, to_space, walk
+from .crowding import close_pairs, uncrowded
+
+Lengths = Callable[[Spots], Floats]
+
+SIX = np.exp(1j * np.pi / 3 * np.arange(6))
+# Proposals closer together than this share of the pitch mean the same place; bubbles are born no closer than CROWDED.
+SAME = 0.5
+CROWDED = 0.72
+# Bubbles of so many generations are searched anew for each generation; older ones only when they have become many.
+RECENT = 4
+
+
+def grow(charts: Charts, pitch: Lengths, seeds: Spots, directions: Complex, most: int) -> tuple[Spots, Complex]:
+    """Lattice grown from `seeds` with a row along each seed's direction, until the region is full.
+
+    Returns the bubbles' places and row directions (unit, in their triangles' frames), seeds first, generation after
+    generation. Ends early when there are more than `most`.
+    """
+    crowd = _Crowd(charts, float(pitch(seeds).max()))
+    spots, heading = seeds, directions
+    crowd.add(seeds)
+    front, front_heading = seeds, directions
+    generations = [(seeds, directions)]
+    total = len(seeds.row)
+    while len(front.row) and total <= most:
+        proposals, turned = _proposals(charts, pitch, crowd, front, front_heading)
+        front, front_heading = _agreed(charts, pitch, crowd, proposals, turned)
+        crowd.add(front)
+        generations.append((front, front_heading))
+        total += len(front.row)
+    spots = Spots(*(np.concatenate(parts) for parts in zip(*(spots for spots, _ in generations), strict=True)))
+    heading = np.concatenate([heading for _, heading in generations])
+    return spots, heading
+
+
+class _Crowd:
+    """Bubbles born so far, to be asked who is near: it keeps search trees from one question to the next."""
+
+    def __init__(self, charts: Charts, reach: float) -> None:
+        self.charts, self.reach = charts, reach
+        self.old = np.empty((0, 7))
+        self.old_tree: cKDTree | None = None
+        self.recent: list[Floats] = []
+        self.recent_tree: cKDTree | None = None
+
+    def where(self, spots: Spots) -> Floats:
+        return signature(self.charts.region, positions(self.charts, spots), spots.row, self.reach)
+
+    def add(self, spots: Spots) -> None:
+        if not len(spots.row):
+            return
+        self.recent.append(self.where(spots))
+        if len(self.recent) > RECENT and sum(map(len, self.recent)) > 0.3 * len(self.old):
+            self.old = np.concatenate([self.old, *self.recent[:-RECENT]])
+            self.old_tree = cKDTree(self.old, balanced_tree=False, compact_nodes=False)
+            self.recent = self.recent[-RECENT:]
+        self.recent_tree = cKDTree(np.concatenate(self.recent), balanced_tree=False, compact_nodes=False)
+
+    def distance(self, at: Floats, within: float) -> Floats:
+        """Distance from each of `at` (n, 7) to the nearest bubble, infinite beyond `within`."""
+        trees = [tree for tree in (self.old_tree, self.recent_tree) if tree is not None]
+        found = [tree.query(at, distance_upper_bound=within)[0] for tree in trees]
+        return np.min(found, axis=0)
+
+
+def _proposals(
+    charts: Charts, pitch: Lengths, crowd: _Crowd, front: Spots, heading: Complex
+) -> tuple[Spots, Complex]:
+    """Places one pitch from the front's bubbles where no bubble is yet, with the row directions carried there."""
+    parent = np.repeat(np.arange(len(front.row)), 6)
+    start = front.take(parent)
+    way = heading[parent] * np.tile(SIX, len(front.row))
+    length = pitch(front)[parent]
+    # A straight look ahead spares walking to places that are taken.
+    ahead = crowd.where(start)
+    ahead[:, :3] += to_space(charts, start.row, way * length)
+    free = crowd.distance(ahead, 0.6 * length.max()) > 0.6 * length
+    start, way, length = start.take(free), way[free], length[free]
+    walked = walk(charts, start, way * length, carried=way)
+    # The stable distance is the mean of both pitches: go on, or back, by half of what they differ.
+    lacking = (pitch(walked.arrived) - length) / 2
+    inside = walked.left == 0
+    arrived, carried, lacking = walked.arrived.take(inside), walked.carried[inside], lacking[inside]
+    if np.any(np.abs(lacking) > 1e-9 * length.max(initial=1.0)):
+        again = walk(charts, arrived, carried * lacking, carried=carried)
+        inside = again.left == 0
+        arrived, carried = again.arrived.take(inside), again.carried[inside]
+    return arrived, carried
+
+
+def _agreed(
+    charts: Charts, pitch: Lengths, crowd: _Crowd, proposals: Spots, heading: Complex
+) -> tuple[Spots, Complex]:
+    """One bubble for each group of proposals that mean the same place, where it crowds nobody."""
+    if not len(proposals.row):
+        return proposals, heading
+    local = pitch(proposals)
+    at = crowd.where(proposals)
+    free = crowd.distance(at, CROWDED * local.max()) > CROWDED * local
+    proposals, heading, local, at = proposals.take(free), heading[free], local[free], at[free]
+    if not len(local):
+        return proposals, heading
+    pairs = close_pairs(at, SAME * local)
+    links = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(local),) * 2)
+    groups, group = connected_components(links, directed=False)
+    first = np.full(groups, len(local))
+    np.minimum.at(first, group, np.arange(len(local)))
+    votes = np.bincount(group, minlength=groups)
+    mean = np.stack([np.bincount(group, at[:, axis], groups) for axis in range(3)], axis=1) / votes[:, None]
+    leader = proposals.take(first)
+    moved = walk(charts, leader, to_frame(charts, leader.row, mean - at[first, :3]), carried=heading[first])
+    turned = to_frame(charts, leader.row[group], to_space(charts, proposals.row, heading))
+    # Directions a sixth of a turn apart mean the same lattice.
+    six = (turned / np.maximum(np.abs(turned), 1e-300)) ** 6
+    mean_six = np.bincount(group, six.real, groups) + 1j * np.bincount(group, six.imag, groups)
+    own = heading[first] ** 6
+    correction = np.exp(1j * np.angle(mean_six / own) / 6)
+    pairs = close_pairs(crowd.where(moved.arrived), CROWDED * local[first])
+    kept = uncrowded(pairs, np.lexsort((np.arange(groups), -votes)).argsort())
+    return moved.arrived.take(kept), (moved.carried * correction)[kept]

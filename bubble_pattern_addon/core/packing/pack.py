@@ -1,0 +1,150 @@
+"""Step 1 as a whole: first row, lattice, relaxation, population control, last stiff phase."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..boundary import make_boundary, nearest_boundary, signature
+from ..errors import RegionError
+from ..mesh import Floats, Ints
+from ..metric import Field, Places
+from ..progress import Progress, Steps
+from ..recipe import Packing
+from ..region import Region
+from ..surface import Charts, Spots, make_charts, positions, to_frame, to_space
+from .bubbles import Bubbles, Ground, all_spots
+from .crowding import close_pairs, uncrowded
+from .force import STIFFNESS, force_law, stiff_law
+from .lattice import grow
+from .population import control
+from .relax import relax
+from .rim import FirstRow, Track, first_row, inset_track, spots_on_track
+
+# A recipe that asks for more bubbles than this is taken for a slip of the pen.
+MOST = 1_000_000
+# Lattice bubbles nearer to the boundary than this many pitches give way to the first row.
+CLEAR_OF_RIM = 1.05
+# Bubbles of the first row closer than this, as across a narrow neck, do not both fit.
+TOO_CLOSE = 0.8
+# Rounds of relaxation and population control, and how many steps each may take; the last phases' steps.
+ROUNDS = 3
+STIFF_STEPS = 60
+
+
+def pack_steps(region: Region, packing: Packing) -> Steps[tuple[Ground, Bubbles]]:
+    """Bubbles packed tightly in `region`. Raises RegionError where the pitch does not suit the region."""
+    yield Progress("Reading the region", 0.0)
+    charts = make_charts(region)
+    pitch = _pitch_over(region, packing.pitch)
+    _check_count(region, pitch)
+    ground = _ground(charts, pitch, packing.edge_offset)
+    row = _without_conflicts(ground, first_row(ground.track))
+    yield Progress("Growing the lattice", 0.1)
+    free = _lattice(ground, row, packing.seed)
+    bubbles = Bubbles(row, free)
+    if not len(bubbles):
+        raise RegionError(
+            "No bubble fits into the target region: it is narrower than one pitch everywhere; use a smaller pitch or a "
+            "larger region."
+        )
+    for number in range(ROUNDS):
+        yield Progress("Packing the bubbles", 0.2 + 0.2 * number)
+        local = local_pitch(ground, bubbles)
+        bubbles, _ = relax(ground, bubbles, local, packing.iterations, packing.tolerance)
+        bubbles, changed = control(ground, bubbles, local)
+        if not changed:
+            break
+    yield Progress("Evening out the gaps", 0.8)
+    local = local_pitch(ground, bubbles)
+    bubbles, _ = relax(
+        ground, bubbles, local, STIFF_STEPS, packing.tolerance, stiff_law, quickest=0.75 / np.sqrt(STIFFNESS)
+    )
+    return ground, bubbles
+
+
+def local_pitch(ground: Ground, bubbles: Bubbles) -> Floats:
+    """Packing metric at the bubbles, (n,)."""
+    return ground.pitch(all_spots(ground, bubbles))
+
+
+def _pitch_over(region: Region, field: Field):  # type: ignore[no-untyped-def]
+    def pitch(spots: Spots) -> Floats:
+        points = np.einsum("nk,nkc->nc", spots.barycentric, region.corners[spots.row])
+        return field(Places(points, region.triangles[spots.row], spots.barycentric))
+
+    return pitch
+
+
+def _check_count(region: Region, pitch) -> None:  # type: ignore[no-untyped-def]
+    """Raises RegionError where the pitch is no length, or so small that it means over a million bubbles."""
+    rows = np.arange(len(region.triangles))
+    local = pitch(Spots(rows, np.full((len(rows), 3), 1 / 3)))
+    if not (np.isfinite(local).all() and local.min() > 0):
+        raise RegionError("The pitch must be a positive length everywhere in the target region: raise it.")
+    area = np.linalg.norm(region.area_vectors, axis=1) / 2
+    count = float((area / (np.sqrt(0.75) * local**2)).sum())
+    if count > MOST:
+        fitting = float(local.mean()) * np.sqrt(count / MOST)
+        raise RegionError(
+            f"A pitch of {local.mean():.4g} means about {count:,.0f} features in this region, more than {MOST:,}: "
+            f"use a pitch of at least {fitting:.3g}, or a smaller region."
+        )
+
+
+def _ground(charts: Charts, pitch, edge_offset: float) -> Ground:  # type: ignore[no-untyped-def]
+    rim = charts.region.rim
+    if not len(rim):
+        nothing = np.empty(0)
+        empty = Spots(nothing.astype(np.int64), np.empty((0, 3)))
+        track = Track(empty, np.empty((0, 3)), nothing, empty.row, empty.row.astype(bool), nothing.astype(bool))
+        return Ground(charts, None, track, pitch, edge_offset)
+    finest = float(pitch(Spots(rim[:, 0], np.full((len(rim), 3), 1 / 3))).min())
+    boundary = make_boundary(charts.region, finest / 8)
+    assert boundary is not None
+    return Ground(charts, boundary, inset_track(charts, boundary, pitch, edge_offset), pitch, edge_offset)
+
+
+def _where(charts: Charts, spots: Spots, reach: float) -> Floats:
+    return signature(charts.region, positions(charts, spots), spots.row, reach)
+
+
+def _without_conflicts(ground: Ground, row: FirstRow) -> FirstRow:
+    """The first row less those who stand too close, as across a neck or in an acute corner; corners go last."""
+    if not len(row.arc):
+        return row
+    spots = spots_on_track(ground.charts, ground.track, row.wrapped())
+    local = ground.pitch(spots)
+    pairs = close_pairs(_where(ground.charts, spots, float(local.max())), TOO_CLOSE * local)
+    rank = np.lexsort((np.arange(len(local)), row.high > row.low)).argsort()
+    kept = uncrowded(pairs, rank)
+    return FirstRow(*(values[kept] for values in (row.arc, row.low, row.high, row.top, row.around)))
+
+
+def _lattice(ground: Ground, row: FirstRow, seed: int) -> Spots:
+    """Bubbles of a lattice that fills what the first row leaves free."""
+    charts = ground.charts
+    seeds, directions = _seeds(ground, seed)
+    spots, _ = grow(charts, ground.pitch, seeds, directions, MOST)
+    if ground.boundary is None:
+        return spots
+    local = ground.pitch(spots)
+    distance, _ = nearest_boundary(ground.boundary, positions(charts, spots), spots.row)
+    return spots.take(distance > CLEAR_OF_RIM * local + ground.edge_offset)
+
+
+def _seeds(ground: Ground, seed: int) -> tuple[Spots, np.ndarray]:
+    """One start of the lattice for each connected part of the region: its middle, rows along its straightest edge."""
+    region, charts = ground.charts.region, ground.charts
+    area = np.linalg.norm(region.area_vectors, axis=1)
+    middle = region.corners.mean(axis=1)
+    sheets = int(region.sheet.max()) + 1
+    weight = np.bincount(region.sheet, area, sheets)
+    centre = np.stack([np.bincount(region.sheet, area * axis, sheets) for axis in middle.T], axis=1) / weight[:, None]
+    away = np.linalg.norm(middle - centre[region.sheet], axis=1)
+    order = np.lexsort((away, region.sheet))
+    first = order[np.searchsorted(region.sheet[order], np.arange(sheets))]
+    seeds = Spots(first, np.full((sheets, 3), 1 / 3))
+    directions = np.exp(1j * np.random.default_rng(seed).uniform(0, np.pi / 3, sheets)) if seed else np.ones(sheets, complex)
+    return seeds, directions

@@ -1,0 +1,153 @@
+"""Population control between rounds of relaxation: bubbles that are too crowded go, voids are filled."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.spatial import cKDTree
+
+from ..boundary import nearest_boundary, signature
+from ..mesh import Bools, Floats, Ints
+from ..surface import Charts, Spots, positions, to_frame, walk
+from .bubbles import Bubbles, Ground, points_and_rows
+from .crowding import close_pairs, uncrowded
+from .force import Pairs, find_pairs
+
+# A circle through three bubbles with no other inside is a void when its radius is above this share of the pitch (it is
+# 0.577 in the hexagonal arrangement, 0.707 in the square one).
+VOID = 0.8
+# Free bubbles nearer to the boundary than this many radii have been pressed through the first row.
+PRESSED_OUT = 1.3
+# A bubble whose overlap ratio is above this is too crowded; it is 6 in the hexagonal arrangement.
+CROWDED = 8.0
+# Only bubbles with less overlap than this can stand at a void.
+LONELY = 5.6
+
+
+def overlap_ratio(pairs: Pairs, distance: Floats, pitch: Floats) -> Floats:
+    """Overlap ratio of every bubble, (n,): (2/D_i) sum_j (D_i + D_j/2 - d_ij) over the bubbles j in reach.
+
+    (Shimada and Gossard, "Bubble Mesh", 1995.) 6 in the interior of a hexagonal arrangement.
+    """
+    ratio = np.zeros(len(pitch))
+    for own, other in ((pairs.first, pairs.second), (pairs.second, pairs.first)):
+        overlap = np.maximum(pitch[own] + pitch[other] / 2 - distance, 0) * 2 / pitch[own]
+        ratio += np.bincount(own, overlap, len(pitch))
+    return ratio
+
+
+def control(ground: Ground, bubbles: Bubbles, pitch: Floats) -> tuple[Bubbles, int]:
+    """Bubbles without the too crowded ones and with new ones in the voids; and how many came or went."""
+    points, row, _ = points_and_rows(ground, bubbles)
+    pairs = find_pairs(ground.charts, points, row, pitch, 0.0)
+    distance = np.linalg.norm(points[pairs.first] - points[pairs.second], axis=1)
+    ratio = overlap_ratio(pairs, distance, pitch)
+    m = len(bubbles.first_row.arc)
+    gone = _pressed_out(ground, points[m:], row[m:], pitch[m:]) | _too_crowded(pairs, distance, ratio, m)
+    added = _voids(ground, points, row, pitch, np.flatnonzero(ratio < LONELY))
+    if not gone.any() and not len(added.row):
+        return bubbles, 0
+    stay = bubbles.free.take(~gone)
+    free = Spots(np.concatenate([stay.row, added.row]), np.concatenate([stay.barycentric, added.barycentric]))
+    return Bubbles(bubbles.first_row, free), int(gone.sum()) + len(added.row)
+
+
+def _pressed_out(ground: Ground, points: Floats, row: Ints, pitch: Floats) -> Bools:
+    """Free bubbles between the first row and the boundary."""
+    if ground.boundary is None or not len(points):
+        return np.zeros(len(points), dtype=bool)
+    distance, _ = nearest_boundary(ground.boundary, points, row)
+    return distance < PRESSED_OUT * pitch / 2 + ground.edge_offset
+
+
+def _too_crowded(pairs: Pairs, distance: Floats, ratio: Floats, m: int) -> Bools:
+    """Free bubbles that are crowded and no neighbour of theirs is more so, among n - m free ones."""
+    closest = np.full(len(ratio), np.inf)
+    relative = distance / pairs.stable
+    np.minimum.at(closest, pairs.first, relative)
+    np.minimum.at(closest, pairs.second, relative)
+    crowded = (ratio > CROWDED) | (closest < 0.6)
+    crowded[:m] = False
+    rivals = crowded[pairs.first] & crowded[pairs.second]
+    order = np.lexsort((np.arange(len(ratio)), -ratio)).argsort()
+    kept = uncrowded(np.stack([pairs.first[rivals], pairs.second[rivals]], axis=1), order)
+    # Of neighbours that are both crowded only the worst goes: its going relieves the other.
+    return (crowded & kept)[m:]
+
+
+def _voids(ground: Ground, points: Floats, row: Ints, pitch: Floats, lonely: Ints) -> Spots:
+    """Places for new bubbles: centres of empty circles through three of the `lonely` bubbles, as local Delaunay has them."""
+    region, charts = ground.charts.region, ground.charts
+    nothing = Spots(np.empty(0, dtype=np.int64), np.empty((0, 3)))
+    if len(lonely) < 3:
+        return nothing
+    at, local = points[lonely], pitch[lonely]
+    reach = float(local.max())
+    where = signature(region, at, row[lonely], reach)
+    triple = _triples(close_pairs(where, 2.4 * local), len(lonely))
+    if not len(triple):
+        return nothing
+    centre, radius = _circumcircles(at[triple])
+    mean = local[triple].mean(axis=1)
+    wide = (radius > VOID * mean) & (radius < 1.3 * mean)
+    triple, centre, radius, mean = triple[wide], centre[wide], radius[wide], mean[wide]
+    corner = lonely[triple[:, 0]]
+    start = _spots_of(charts, points[corner], row[corner])
+    arrived = walk(charts, start, to_frame(charts, start.row, centre - points[corner])).arrived
+    reached = positions(charts, arrived)
+    kept = np.linalg.norm(reached - centre, axis=1) < 0.2 * mean
+    kept &= _empty(ground, arrived, reached, points, row, 0.95 * radius)
+    if ground.boundary is not None:
+        distance, _ = nearest_boundary(ground.boundary, reached, arrived.row)
+        kept &= distance > PRESSED_OUT * mean / 2 + ground.edge_offset
+    arrived, radius, mean = arrived.take(kept), radius[kept], mean[kept]
+    if not len(mean):
+        return nothing
+    where = signature(region, positions(charts, arrived), arrived.row, reach)
+    rank = np.lexsort((np.arange(len(mean)), -radius / mean)).argsort()
+    return arrived.take(uncrowded(close_pairs(where, 0.9 * mean), rank))
+
+
+def _spots_of(charts: Charts, points: Floats, row: Ints) -> Spots:
+    """Places of points known to lie on the triangles `row`."""
+    corners = charts.region.corners[row]
+    local = to_frame(charts, row, points - corners[:, 0])
+    bary = np.real(np.conj(charts.gradients[row]) * local[:, None])
+    bary[:, 0] += 1
+    bary = np.maximum(bary, 0)
+    return Spots(row, bary / bary.sum(axis=1, keepdims=True))
+
+
+def _triples(pairs: Ints, n: int) -> Ints:
+    """All (m, 3) sets of three of which every two are a pair."""
+    low, high = np.sort(pairs, axis=1).T
+    link = csr_array((np.ones(len(low), dtype=np.int8), (low, high)), shape=(n, n))
+    degree = np.diff(link.indptr)
+    # For every pair (i, j) all k linked from j: a triple where (i, k) is a pair too.
+    owner = np.repeat(np.arange(len(low)), degree[high])
+    offset = np.arange(len(owner)) - np.repeat(np.cumsum(degree[high]) - degree[high], degree[high])
+    third = link.indices[link.indptr[high[owner]] + offset]
+    code = np.sort(low.astype(np.int64) * n + high)
+    sought = low[owner].astype(np.int64) * n + third
+    found = np.searchsorted(code, sought)
+    known = code[np.minimum(found, len(code) - 1)] == sought if len(code) else np.zeros(0, dtype=bool)
+    return np.stack([low[owner], high[owner], third], axis=1)[known]
+
+
+def _circumcircles(corners: Floats) -> tuple[Floats, Floats]:
+    """Centres (m, 3) and radii (m,) of the circles through three points, (m, 3, 3)."""
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    normal = np.cross(a, b)
+    square = np.maximum(np.einsum("mc,mc->m", normal, normal), 1e-300)
+    aa, bb = np.einsum("mc,mc->m", a, a), np.einsum("mc,mc->m", b, b)
+    offset = np.cross(aa[:, None] * b - bb[:, None] * a, normal) / (2 * square[:, None])
+    return corners[:, 0] + offset, np.linalg.norm(offset, axis=1)
+
+
+def _empty(ground: Ground, spots: Spots, at: Floats, points: Floats, row: Ints, radius: Floats) -> Bools:
+    """Whether no bubble is within `radius` of the places."""
+    region = ground.charts.region
+    reach = float(radius.max(initial=0.0))
+    tree = cKDTree(signature(region, points, row, reach))
+    distance, _ = tree.query(signature(region, at, spots.row, reach))
+    return distance > radius
