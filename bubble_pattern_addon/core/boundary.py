@@ -10,7 +10,8 @@ from scipy.spatial import cKDTree
 from .mesh import Floats, Ints
 from .region import Region
 
-# Nearest samples whose segments are measured exactly; two segments meet at a corner, a sheet's fold may add some more.
+# Nearest samples whose segments are measured exactly; two segments meet at a corner, a sheet's fold may add
+# some more.
 CANDIDATES = 4
 
 
@@ -18,8 +19,8 @@ CANDIDATES = 4
 class Boundary:
     """The boundary of a `region`, ready to be asked for distances.
 
-    segments: (S, 2, 3) with the region on the left; owner: (K,) segment of each sample in `tree`; reach: the length
-    over which two sheets of the region may face each other without being confused
+    segments: (S, 2, 3) with the region on the left; owner: (K,) segment of each sample in `tree`; reach: the
+    length over which two sheets of the region may face each other without being confused
     """
 
     region: Region
@@ -30,7 +31,9 @@ class Boundary:
 
 
 def make_boundary(region: Region, spacing: float) -> Boundary | None:
-    """Index of the region's boundary with samples no farther apart than `spacing`; None where it has no boundary."""
+    """Index of the region's boundary with samples no farther apart than `spacing`; None where it has no
+    boundary.
+    """
     if not len(region.rim):
         return None
     segments = region.boundary_segments
@@ -48,8 +51,9 @@ def make_boundary(region: Region, spacing: float) -> Boundary | None:
 def signature(region: Region, points: Floats, row: Ints, reach: float) -> Floats:
     """Coordinates (n, 7) in which places on different sheets are far apart although they touch in space.
 
-    points: (n, 3) on the triangles `row` (n,). Normals count with the length `reach`, so that both sides of a wall thinner than that are kept apart; parts of the
-    region that are not connected are moved out of one another's sight.
+    points: (n, 3) on the triangles `row` (n,). Normals count with the length `reach`, so that both sides of a
+    wall thinner than that are kept apart; parts of the region that are not connected are moved out of one
+    another's sight.
     """
     apart = 1e3 * (region.extent + reach) * region.sheet[row]
     return np.concatenate([points, reach * region.normals[row], apart[:, None]], axis=1)
@@ -65,7 +69,9 @@ def nearest_boundary(boundary: Boundary, points: Floats, row: Ints) -> tuple[Flo
     ends = boundary.segments[boundary.owner[near.reshape(len(points), count)]]
     start, along = ends[..., 0, :], ends[..., 1, :] - ends[..., 0, :]
     offset = points[:, None] - start
-    share = np.einsum("nkc,nkc->nk", offset, along) / np.maximum(np.einsum("nkc,nkc->nk", along, along), 1e-300)
+    share = np.einsum("nkc,nkc->nk", offset, along) / np.maximum(
+        np.einsum("nkc,nkc->nk", along, along), 1e-300
+    )
     foot = start + np.clip(share, 0, 1)[..., None] * along
     distance = np.linalg.norm(points[:, None] - foot, axis=2)
     best = distance.argmin(axis=1)

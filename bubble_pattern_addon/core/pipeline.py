@@ -6,8 +6,8 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
-from .metric import Places
 from .mesh import Floats, Ints
+from .metric import Places
 from .packing.bubbles import all_spots
 from .packing.force import find_pairs
 from .packing.pack import local_pitch, pack_steps
@@ -25,7 +25,8 @@ TOUCHING = 1.35
 def pattern_steps(region: Region, recipe: Recipe) -> Steps[Pattern]:
     """Pattern of `recipe` in `region`: packs the bubbles (step 1) and shapes their features (step 2).
 
-    Raises RegionError where the pitch does not suit the region, RecipeError where the diameter does not suit the pitch.
+    Raises RegionError where the pitch does not suit the region, RecipeError where the diameter does not suit
+    the pitch.
     """
     ground, bubbles = yield from pack_steps(region, recipe.packing)
     yield Progress("Shaping the features", 0.95)
@@ -53,8 +54,9 @@ def _links(charts: Charts, spots: Spots, points: Floats, pitch: Floats) -> tuple
 
 
 def _rows(links: tuple[Ints, Ints], n: int, first: int) -> Ints:
-    """Row of every bubble (n,): 0 for the `first` bubbles along the boundary, else the steps from there; -1 where no
-    boundary can be reached."""
+    """Row of every bubble (n,): 0 for the `first` bubbles along the boundary, else the steps from there; -1
+    where no boundary can be reached.
+    """
     if not first:
         return np.full(n, -1)
     graph = coo_array((np.ones(len(links[0])), links), shape=(n, n)).tocsr()
@@ -63,7 +65,9 @@ def _rows(links: tuple[Ints, Ints], n: int, first: int) -> Ints:
 
 
 def _tangents(charts: Charts, spots: Spots, points: Floats, links: tuple[Ints, Ints]) -> Floats:
-    """Unit vectors (n, 3) along a row of the arrangement: of its six directions the one nearest to the x axis."""
+    """Unit vectors (n, 3) along a row of the arrangement: of its six directions the one nearest to the x
+    axis.
+    """
     n = len(points)
     six = np.zeros(n, dtype=np.complex128)
     for own, other in (links, links[::-1]):

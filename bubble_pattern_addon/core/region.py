@@ -12,7 +12,8 @@ from scipy.sparse.csgraph import connected_components
 from .errors import RegionError
 from .mesh import Bools, Floats, Ints, Mesh
 
-# A triangle is flat when its height is below this share of its longest edge: walking over it would divide by zero.
+# A triangle is flat when its height is below this share of its longest edge: walking over it would divide by
+# zero.
 FLAT = 1e-12
 
 
@@ -65,7 +66,7 @@ class Region:
 
     @cached_property
     def single_sheet(self) -> bool:
-        """Whether the region is one piece whose normals all lie in one cone: no part of it can face another."""
+        """Whether the region is one piece with all normals in one cone: no part of it can face another."""
         mean = self.area_vectors.sum(axis=0)
         length = np.linalg.norm(mean)
         return bool(self.sheet.max() == 0 and length > 0 and (self.normals @ mean).min() > 0.7 * length)
@@ -83,8 +84,8 @@ class Region:
 def make_region(base: Mesh, selected: Bools) -> Region:
     """Region made of the `selected` (T,) triangles of `base`.
 
-    Edges that more than two region triangles share, or that two of them run along in the same direction, count as
-    boundary: bubbles do not cross them.
+    Edges that more than two region triangles share, or that two of them run along in the same direction,
+    count as boundary: bubbles do not cross them.
 
     Raises RegionError where nothing is selected, a coordinate is not a number or a triangle has no area.
     """
@@ -101,7 +102,8 @@ def make_region(base: Mesh, selected: Bools) -> Region:
 
 def weld(mesh: Mesh) -> Mesh:
     """The same triangles on vertices that are unique by position; rows of `triangles` keep their order."""
-    # Sorting one opaque key per vertex is several times faster than np.unique(axis=0); adding 0.0 makes -0.0 equal 0.0.
+    # Sorting one opaque key per vertex is several times faster than np.unique(axis=0); adding 0.0 makes -0.0
+    # equal 0.0.
     keys = np.ascontiguousarray(mesh.vertices + 0.0).view(np.dtype((np.void, 24))).ravel()
     _, first, inverse = np.unique(keys, return_index=True, return_inverse=True)
     if len(first) == len(keys):
@@ -161,7 +163,9 @@ def _sheets(neighbours: Ints) -> Ints:
 
 
 def _boundary_loops(rows: Ints, neighbours: Ints, opposite: Ints) -> tuple[tuple[Ints, ...], Ints]:
-    """Boundary edges chained into loops: vertex rows per loop, and all edges as (row, opposite corner) in loop order."""
+    """Boundary edges chained into loops: vertex rows per loop, and all edges as (row, opposite corner) in
+    loop order.
+    """
     row, corner = np.nonzero(neighbours < 0)
     following = _next_boundary_edge(row, corner, neighbours, opposite)
     number = np.full(neighbours.shape, -1)
@@ -184,8 +188,11 @@ def _boundary_loops(rows: Ints, neighbours: Ints, opposite: Ints) -> tuple[tuple
 
 
 def _next_boundary_edge(row: Ints, corner: Ints, neighbours: Ints, opposite: Ints) -> tuple[Ints, Ints]:
-    """The boundary edge that leaves where each given one ends, found by turning round that vertex inside the region."""
-    row, corner = row.copy(), (corner + 1) % 3  # the next edge of the same triangle starts where this one ends
+    """The boundary edge that leaves where each given one ends, found by turning round that vertex inside the
+    region.
+    """
+    # the next edge of the same triangle starts where this one ends
+    row, corner = row.copy(), (corner + 1) % 3
     turning = np.flatnonzero(neighbours[row, corner] >= 0)
     while len(turning):
         r, c = row[turning], corner[turning]

@@ -1,8 +1,9 @@
 """Places on the target region and the way from one to the next.
 
-A place is a region row (a triangle) with barycentric coordinates, so that a bubble never leaves the surface; it moves by
-walking straight on across the edges (a discrete geodesic, Polthier and Schmies, "Straightest Geodesics on Polyhedral
-Surfaces", 1998). Steps are complex numbers in the orthonormal frame of the triangle they start in.
+A place is a region row (a triangle) with barycentric coordinates, so that a bubble never leaves the surface;
+it moves by walking straight on across the edges (a discrete geodesic, Polthier and Schmies, "Straightest
+Geodesics on Polyhedral Surfaces", 1998). Steps are complex numbers in the orthonormal frame of the triangle
+they start in.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from .region import Region
 
 Complex = NDArray[np.complex128]
 
-# How far outside a triangle, as a share of its height, still counts as inside: far below any length that matters.
+# How far outside a triangle, as a share of its height, still counts as inside: far below any length that
+# matters.
 INSIDE = -1e-12
 # Faces that turn by more than this meet in an edge, not in a smooth surface.
 CREASE = np.radians(35.0)
@@ -29,10 +31,12 @@ class Charts:
     """The plane frames of a region's triangles and how they fit together.
 
     region: the region they belong to
-    axes: (R, 2, 3) orthonormal axes of each triangle's plane; axis 0 runs along the edge from corner 0 to corner 1
+    axes: (R, 2, 3) orthonormal axes of each triangle's plane; axis 0 runs along the edge from corner 0 to
+    corner 1
     corners: (R, 3) corner positions in the frame, corner 0 at the origin
     gradients: (R, 3) gradients of the three barycentric coordinates
-    turns: (R, 3) unit rotations that take a step from this frame into that of the neighbour opposite to each corner
+    turns: (R, 3) unit rotations that take a step from this frame into that of the neighbour opposite to each
+    corner
     """
 
     region: Region
@@ -54,8 +58,9 @@ class Spots(NamedTuple):
 
 
 class Walk(NamedTuple):
-    """Where a walk ended. arrived: places; carried: (n,) directions brought along, in the new frame; left: (n,) what
-    remained of the step where the boundary stopped it, 0 elsewhere."""
+    """Where a walk ended. arrived: places; carried: (n,) directions brought along, in the new frame; left:
+    (n,) what remained of the step where the boundary stopped it, 0 elsewhere.
+    """
 
     arrived: Spots
     carried: Complex
@@ -98,7 +103,8 @@ def to_space(charts: Charts, row: Ints, steps: Complex) -> Floats:
 
 
 def walk(charts: Charts, start: Spots, steps: Complex, carried: Complex | None = None) -> Walk:
-    """Walk straight from `start` by `steps` (n,), all at once: every pass takes everyone over at most one edge.
+    """Walk straight from `start` by `steps` (n,), all at once: every pass takes everyone over at most one
+    edge.
 
     Directions `carried` (n,) are transported along. A walk ends where it meets the boundary.
     """
@@ -115,7 +121,8 @@ def walk(charts: Charts, start: Spots, steps: Complex, carried: Complex | None =
         inside = ~leaving
         bary[active[inside]] = there[inside]
         left[active[inside]] = 0
-        active, at, here, step, rate = (part[leaving] for part in (active, at, here, step, rate))
+        active, at, here = active[leaving], at[leaving], here[leaving]
+        step, rate = step[leaving], rate[leaving]
         with np.errstate(divide="ignore", invalid="ignore"):
             share = np.where(here + rate < INSIDE, np.maximum(here, 0) / -rate, np.inf)
         corner = share.argmin(axis=1)
@@ -144,8 +151,8 @@ def walk(charts: Charts, start: Spots, steps: Complex, carried: Complex | None =
 def smooth_normals(region: Region, spots: Spots) -> Floats:
     """Outward unit normals (n, 3) of the surface that the triangles stand for.
 
-    Interpolated between corner normals, each the mean (weighted by area) of the triangles round that vertex that turn by
-    less than CREASE from this one: a tessellated curve is smooth, an edge stays an edge.
+    Interpolated between corner normals, each the mean (weighted by area) of the triangles round that vertex
+    that turn by less than CREASE from this one: a tessellated curve is smooth, an edge stays an edge.
     """
     corner_normals = _corner_normals(region)
     normal = np.einsum("nk,nkc->nc", spots.barycentric, corner_normals[spots.row])

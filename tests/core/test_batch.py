@@ -175,7 +175,7 @@ BAD = {
     "three faces on an edge": (GRILLE, with_fin(plate()), "more than two faces"),
     "face without area": (GRILLE, with_flat_face(plate()), "area"),
     "pitch over region": (TOP + "[packing]\npitch = 90\n", plate(), "pitch"),
-    "a million features": (TOP + "[packing]\npitch = 0.01\n", plate(), "million"),
+    "a million features": (TOP + "[packing]\npitch = 0.01\n", plate(), "more than 1,000,000"),
     "margin": (GRILLE + LIMITS, plate(), "raise edge_offset by"),
     "too thick": (GRILLE.replace("2]", "100]"), trimesh.creation.box((40, 30, 200)), "too thick to pierce"),
 }

@@ -17,7 +17,8 @@ def close_pairs(at: Floats, distance: Floats) -> Ints:
 
 
 def uncrowded(pairs: Ints, rank: Ints) -> Bools:
-    """Which of n bubbles stay, (n,), when of every close pair (m, 2) the one with the higher `rank` (n,) gives way.
+    """Which of n bubbles stay, (n,), when of every close pair (m, 2) the one with the higher `rank` (n,)
+    gives way.
 
     One that has given way troubles nobody any more: the result is that of going through all bubbles by rank.
     """

@@ -1,9 +1,9 @@
 """A hexagonal lattice grown over the surface: where the bubbles start.
 
-From random points the force law makes grains; the look of the paper, one crystal in the core and all defects in the rim,
-needs a crystal to start from. On a surface without a plane it grows outward: every bubble of the front sends a step of one
-pitch into each of six directions, the directions are carried along straight walks, and what several bubbles propose for one
-place is averaged.
+From random points the force law makes grains; the look of the paper, one crystal in the core and all defects
+in the rim, needs a crystal to start from. On a surface without a plane it grows outward: every bubble of the
+front sends a step of one pitch into each of six directions, the directions are carried along straight walks,
+and what several bubbles propose for one place is averaged.
 """
 
 from __future__ import annotations
@@ -23,18 +23,22 @@ from .crowding import close_pairs, uncrowded
 Lengths = Callable[[Spots], Floats]
 
 SIX = np.exp(1j * np.pi / 3 * np.arange(6))
-# Proposals closer together than this share of the pitch mean the same place; bubbles are born no closer than CROWDED.
+# Proposals closer together than this share of the pitch mean the same place; bubbles are born no closer than
+# CROWDED.
 SAME = 0.5
 CROWDED = 0.72
-# Bubbles of so many generations are searched anew for each generation; older ones only when they have become many.
+# Bubbles of so many generations are searched anew for each generation; older ones only when they have become
+# many.
 RECENT = 4
 
 
-def grow(charts: Charts, pitch: Lengths, seeds: Spots, directions: Complex, most: int) -> tuple[Spots, Complex]:
+def grow(
+    charts: Charts, pitch: Lengths, seeds: Spots, directions: Complex, most: int
+) -> tuple[Spots, Complex]:
     """Lattice grown from `seeds` with a row along each seed's direction, until the region is full.
 
-    Returns the bubbles' places and row directions (unit, in their triangles' frames), seeds first, generation after
-    generation. Ends early when there are more than `most`.
+    Returns the bubbles' places and row directions (unit, in their triangles' frames), seeds first, generation
+    after generation. Ends early when there are more than `most`.
     """
     crowd = _Crowd(charts, float(pitch(seeds).max()))
     spots, heading = seeds, directions
@@ -48,7 +52,9 @@ def grow(charts: Charts, pitch: Lengths, seeds: Spots, directions: Complex, most
         crowd.add(front)
         generations.append((front, front_heading))
         total += len(front.row)
-    spots = Spots(*(np.concatenate(parts) for parts in zip(*(spots for spots, _ in generations), strict=True)))
+    spots = Spots(
+        *(np.concatenate(parts) for parts in zip(*(spots for spots, _ in generations), strict=True))
+    )
     heading = np.concatenate([heading for _, heading in generations])
     return spots, heading
 
@@ -86,7 +92,9 @@ class _Crowd:
 def _proposals(
     charts: Charts, pitch: Lengths, crowd: _Crowd, front: Spots, heading: Complex
 ) -> tuple[Spots, Complex]:
-    """Places one pitch from the front's bubbles where no bubble is yet, with the row directions carried there."""
+    """Places one pitch from the front's bubbles where no bubble is yet, with the row directions carried
+    there.
+    """
     parent = np.repeat(np.arange(len(front.row)), 6)
     start = front.take(parent)
     way = heading[parent] * np.tile(SIX, len(front.row))

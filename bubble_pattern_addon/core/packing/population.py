@@ -13,8 +13,8 @@ from .bubbles import Bubbles, Ground, points_and_rows
 from .crowding import close_pairs, uncrowded
 from .force import Pairs, find_pairs
 
-# A circle through three bubbles with no other inside is a void when its radius is above this share of the pitch (it is
-# 0.577 in the hexagonal arrangement, 0.707 in the square one).
+# A circle through three bubbles with no other inside is a void when its radius is above this share of the
+# pitch (it is 0.577 in the hexagonal arrangement, 0.707 in the square one).
 VOID = 0.8
 # Free bubbles nearer to the boundary than this many radii have been pressed through the first row.
 PRESSED_OUT = 1.3
@@ -76,7 +76,9 @@ def _too_crowded(pairs: Pairs, distance: Floats, ratio: Floats, m: int) -> Bools
 
 
 def _voids(ground: Ground, points: Floats, row: Ints, pitch: Floats, lonely: Ints) -> Spots:
-    """Places for new bubbles: centres of empty circles through three of the `lonely` bubbles, as local Delaunay has them."""
+    """Places for new bubbles: centres of empty circles through three of the `lonely` bubbles, as local
+    Delaunay has them.
+    """
     region, charts = ground.charts.region, ground.charts
     nothing = Spots(np.empty(0, dtype=np.int64), np.empty((0, 3)))
     if len(lonely) < 3:

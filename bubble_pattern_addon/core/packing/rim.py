@@ -1,9 +1,10 @@
-"""The first row: lines one bubble radius inside the boundary, and the bubbles on them (paper, requirement 3)."""
+"""The first row: lines one bubble radius inside the boundary, and bubbles on them (paper, requirement 3)."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -27,8 +28,9 @@ Lengths = Callable[[Spots], Floats]
 class Track:
     """Inset lines as polylines on the surface, one after the other in one array of knots.
 
-    spots, points: the K knots on the surface; sheet: (K,); arc: (K,) length travelled, measured in local pitches,
-    growing over all lines; chain: (K,) the line a knot belongs to; sharp: (K,) knots that are sharp corners;
+    spots, points: the K knots on the surface; sheet: (K,); arc: (K,) length travelled, measured in local
+    pitches, growing over all lines; chain: (K,) the line a knot belongs to; sharp: (K,) knots that are sharp
+    corners;
     closed: (C,) whether a line runs back to its start (its first knot then stands again as its last)
     """
 
@@ -42,8 +44,10 @@ class Track:
 
 @dataclass(frozen=True)
 class FirstRow:
-    """Bubbles on the track: arc (n,) where they are; low, high (n,) how far they may slide (equal for a corner's);
-    top, around (n,): where a line that closes on itself ends and how long it is, infinite and 0 for an open one."""
+    """Bubbles on the track: arc (n,) where they are; low, high (n,) how far they may slide (equal for a
+    corner's); top, around (n,): where a line that closes on itself ends and how long it is, infinite and 0
+    for an open one.
+    """
 
     arc: Floats
     low: Floats
@@ -52,16 +56,18 @@ class FirstRow:
     around: Floats
 
     def wrapped(self) -> Floats:
-        """The arcs brought back onto their lines, (n,): a bubble may have slid past the end of a closed one."""
+        """The arcs brought back onto their lines, (n,): a bubble may have slid past a closed one's end."""
         beyond = np.floor((self.top - self.arc) / np.where(self.around > 0, self.around, 1.0))
         return np.where(self.around > 0, self.arc + beyond * self.around, self.arc)
 
 
 def inset_track(charts: Charts, boundary: Boundary, pitch: Lengths, edge_offset: float) -> Track:
-    """Lines where the distance to the boundary is the local bubble's radius, half a `pitch`, plus `edge_offset`.
+    """Lines where the distance to the boundary is the local bubble's radius, half a `pitch`, plus
+    `edge_offset`.
 
-    Every boundary edge is sampled, each sample walks inward by the radius, and those that came nearer to another part of
-    the boundary are dropped: what remains is the line, in runs that are joined at the inner corners.
+    Every boundary edge is sampled, each sample walks inward by the radius, and those that came nearer to
+    another part of the boundary are dropped: what remains is the line, in runs that are joined at the inner
+    corners.
     """
 
     def radius(at: Spots) -> Floats:
@@ -75,7 +81,9 @@ def inset_track(charts: Charts, boundary: Boundary, pitch: Lengths, edge_offset:
 
 
 def _walked_inward(charts: Charts, boundary: Boundary, radius: Lengths) -> tuple[Spots, Ints, Ints, Ints]:
-    """Samples of the inset line: spots (m,), loop (m,), number among all samples (m,); and samples per loop (L,)."""
+    """Samples of the inset line: spots (m,), loop (m,), number among all samples (m,); and samples per loop
+    (L,).
+    """
     region = charts.region
     row, corner = region.rim.T
     number = _samples_per_edge(charts, radius)
@@ -98,7 +106,9 @@ def _samples_per_edge(charts: Charts, radius: Lengths) -> Ints:
     region = charts.region
     row, corner = region.rim.T
     length = np.linalg.norm(region.boundary_segments[:, 1] - region.boundary_segments[:, 0], axis=1)
-    local = np.min([radius(_on_edges(row, corner, np.full(len(row), share))) for share in (0.0, 0.5, 1.0)], axis=0)
+    local = np.min(
+        [radius(_on_edges(row, corner, np.full(len(row), share))) for share in (0.0, 0.5, 1.0)], axis=0
+    )
     return np.maximum(np.ceil(FINENESS * length / local).astype(np.int64), 1)
 
 
@@ -116,7 +126,7 @@ def _to_boundary(charts: Charts, boundary: Boundary, spots: Spots) -> tuple[Floa
 
 
 def _settled(charts: Charts, boundary: Boundary, radius: Lengths, spots: Spots, rounds: int = 3) -> Spots:
-    """The same places moved to where the distance to the boundary is the radius (Newton along the distance)."""
+    """The same places moved to where the distance to the boundary is the radius, by Newton's method."""
     for _ in range(rounds):
         distance, foot = _to_boundary(charts, boundary, spots)
         lacking = radius(spots) - distance
@@ -127,10 +137,16 @@ def _settled(charts: Charts, boundary: Boundary, radius: Lengths, spots: Spots, 
     return spots
 
 
-def _joined(points: Floats, loop: Ints, position: Ints, sizes: Ints, radius: Floats) -> list[tuple[list[Ints], bool]]:
-    """Runs of neighbouring samples, chained where one ends near the start of another; and whether the chain closes."""
+def _joined(
+    points: Floats, loop: Ints, position: Ints, sizes: Ints, radius: Floats
+) -> list[tuple[list[Ints], bool]]:
+    """Runs of neighbouring samples, chained where one ends near the start of another; and whether the chain
+    closes.
+    """
     runs, whole = _runs(loop, position, sizes)
-    chains: list[tuple[list[Ints], bool]] = [([run], True) for run, alone in zip(runs, whole, strict=True) if alone]
+    chains: list[tuple[list[Ints], bool]] = [
+        ([run], True) for run, alone in zip(runs, whole, strict=True) if alone
+    ]
     pieces = [run for run, alone in zip(runs, whole, strict=True) if not alone]
     if not pieces:
         return chains
@@ -163,9 +179,11 @@ def _first_claim(follows: Ints, gap: Floats) -> Bools:
 
 
 def _runs(loop: Ints, position: Ints, sizes: Ints) -> tuple[list[Ints], list[bool]]:
-    """Runs of samples that stand next to one another on their loop; True for a loop of which no sample is missing.
+    """Runs of samples that stand next to one another on their loop; True for a loop of which no sample is
+    missing.
 
-    loop, position: (m,) the loop a sample belongs to and its number among all samples; sizes: (L,) samples per loop
+    loop, position: (m,) the loop a sample belongs to and its number among all samples; sizes: (L,) samples
+    per loop
     """
     runs: list[Ints] = []
     whole: list[bool] = []
@@ -186,7 +204,7 @@ def _runs(loop: Ints, position: Ints, sizes: Ints) -> tuple[list[Ints], list[boo
 def _knots(
     charts: Charts, boundary: Boundary, radius: Lengths, spots: Spots, chain: list[Ints], closed: bool
 ) -> tuple[Spots, bool]:
-    """Knots of one line: the samples with the corners between the runs, and no gap wider than half a radius."""
+    """Knots of one line: samples, the corners between the runs, and no gap wider than half a radius."""
     rows: list[Ints] = []
     barys: list[Floats] = []
     for number, run in enumerate(chain):
@@ -239,17 +257,21 @@ def _filled(charts: Charts, boundary: Boundary, radius: Lengths, knots: Spots) -
     added = _settled(charts, boundary, radius, added, rounds=5)
     place = np.argsort(np.concatenate([np.arange(len(points)), owner + share]), kind="stable")
     return Spots(
-        np.concatenate([knots.row, added.row])[place], np.concatenate([knots.barycentric, added.barycentric])[place]
+        np.concatenate([knots.row, added.row])[place],
+        np.concatenate([knots.barycentric, added.barycentric])[place],
     )
 
 
 def _track(charts: Charts, parts: list[tuple[Spots, bool]], pitch: Lengths) -> Track:
     if not parts:
         empty = Spots(np.empty(0, dtype=np.int64), np.empty((0, 3)))
-        return Track(empty, np.empty((0, 3)), np.empty(0), empty.row, empty.row.astype(bool), np.empty(0, dtype=bool))
+        return Track(
+            empty, np.empty((0, 3)), np.empty(0), empty.row, empty.row.astype(bool), np.empty(0, dtype=bool)
+        )
     sizes = [len(knots.row) for knots, _ in parts]
     spots = Spots(
-        np.concatenate([knots.row for knots, _ in parts]), np.concatenate([knots.barycentric for knots, _ in parts])
+        np.concatenate([knots.row for knots, _ in parts]),
+        np.concatenate([knots.barycentric for knots, _ in parts]),
     )
     chain = np.repeat(np.arange(len(parts)), sizes)
     points = positions(charts, spots)
@@ -263,7 +285,9 @@ def _track(charts: Charts, parts: list[tuple[Spots, bool]], pitch: Lengths) -> T
 
 
 def _sharp_knots(points: Floats, arc: Floats, chain: Ints, closed: Bools) -> Bools:
-    """Knots at which the line turns sharply, seen at the scale of the pitch; the ends of open lines count as sharp."""
+    """Knots at which the line turns sharply, seen at the scale of the pitch; the ends of open lines count as
+    sharp.
+    """
     first = np.searchsorted(chain, np.arange(len(closed)))
     last = np.searchsorted(chain, np.arange(len(closed)), side="right") - 1
     low, high = arc[first][chain], arc[last][chain]
@@ -271,7 +295,9 @@ def _sharp_knots(points: Floats, arc: Floats, chain: Ints, closed: Bools) -> Boo
     around = np.where(closed[chain], high - low, 0.0)
     ahead = np.minimum(np.where(ahead > high, ahead - around, ahead), high)
     back = np.maximum(np.where(back < low, back + around, back), low)
-    forward, backward = (np.stack([np.interp(at, arc, axis) for axis in points.T], axis=1) for at in (ahead, back))
+    forward, backward = (
+        np.stack([np.interp(at, arc, axis) for axis in points.T], axis=1) for at in (ahead, back)
+    )
     forward, backward = forward - points, points - backward
     cosine = np.einsum("nc,nc->n", forward, backward)
     cosine /= np.maximum(np.linalg.norm(forward, axis=1) * np.linalg.norm(backward, axis=1), 1e-300)
@@ -292,7 +318,9 @@ def _sharp_knots(points: Floats, arc: Floats, chain: Ints, closed: Bools) -> Boo
 
 
 def first_row(track: Track) -> FirstRow:
-    """Bubbles of the first row: one at every sharp corner, the others evenly spaced between (in local pitches)."""
+    """Bubbles of the first row: one at every sharp corner, the others evenly spaced between (in local
+    pitches).
+    """
     parts: list[Floats] = []
     for number, closed in enumerate(track.closed):
         knots = np.flatnonzero(track.chain == number)
@@ -305,7 +333,7 @@ def first_row(track: Track) -> FirstRow:
             parts.append(np.stack([arc, *np.broadcast_arrays(-np.inf, np.inf, top, around, arc)[:4]]))
             continue
         ends = np.append(fixed, fixed[0] + high - low) if closed else fixed
-        for start, stop in zip(ends[:-1], ends[1:], strict=True):
+        for start, stop in pairwise(ends):
             count = _count(stop - start)
             arc = start + (stop - start) * np.arange(count) / count
             corner = np.arange(count) == 0
@@ -321,7 +349,9 @@ def first_row(track: Track) -> FirstRow:
 
 
 def _count(length: float) -> int:
-    """Bubbles along a stretch of `length` pitches: spaced by one pitch as nearly as can be, never much closer."""
+    """Bubbles along a stretch of `length` pitches: spaced by one pitch as nearly as can be, never much
+    closer.
+    """
     count = max(round(length), 1)
     return count - 1 if count > 1 and length / count < CLOSEST else count
 
