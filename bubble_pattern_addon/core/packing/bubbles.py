@@ -8,7 +8,7 @@ import numpy as np
 
 from ..boundary import Boundary
 from ..mesh import Floats, Ints
-from ..surface import Charts, Spots, positions, to_frame, walk
+from ..surface import Charts, Spots, positions
 from .rim import FirstRow, Lengths, Track, on_track, spots_on_track
 
 
@@ -61,11 +61,6 @@ def points_and_rows(ground: Ground, bubbles: Bubbles) -> tuple[Floats, Ints, Flo
     )
 
 
-def moved(ground: Ground, bubbles: Bubbles, steps: Floats, tangent: Floats, pitch: Floats) -> Bubbles:
-    """The bubbles after `steps` (n, 3): the first row slides along its track, the others walk on the surface."""
-    row = bubbles.first_row
-    m = len(row.arc)
-    arc = np.clip(row.arc + np.einsum("mc,mc->m", steps[:m], tangent) / pitch[:m], row.low, row.high)
-    free, charts = bubbles.free, ground.charts
-    arrived = walk(charts, free, to_frame(charts, free.row, steps[m:])).arrived
-    return Bubbles(replace(row, arc=arc), arrived)
+def with_arc(row: FirstRow, arc: Floats) -> FirstRow:
+    """The same first row at other arcs."""
+    return replace(row, arc=arc)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +16,13 @@ from ..surface import Charts
 REACH = 1.5
 # How many times stiffer than the law's own the contact is in the last phase.
 STIFFNESS = 12.0
+# The last phase pushes pairs apart that are closer than this share of their stable distance.
+EVEN = 0.96
+# No bubble feels more others than this: on a crowded spot a dozen have room within 1.66 pitches.
+MOST_NEAR = 20
+
+
+Law = Callable[[Floats], Floats]
 
 
 class Pairs(NamedTuple):
@@ -31,12 +39,16 @@ def force_law(w: Floats) -> Floats:
     The bounded cubic 5/4 w^3 - 19/8 w^2 + 9/8 for 0 <= w < 1.5, else 0: the only cubic with f(1) = 0, f(1.5) = 0,
     f'(0) = 0 whose slope at contact is -1 (Shimada and Gossard, "Bubble Mesh", 1995; the paper's Eq. 1).
     """
-    return np.where(w < REACH, (1.25 * w - 2.375) * w * w + 1.125, 0.0)
+    w = np.minimum(w, REACH)
+    return (1.25 * w - 2.375) * (w * w) + 1.125
 
 
 def stiff_law(w: Floats) -> Floats:
-    """l0/k0 times a force many times as stiff below contact and the law's own beyond: it evens out the smallest gaps."""
-    return np.where(w < 1.0, STIFFNESS * (1.0 - w), force_law(w))
+    """l0/k0 times the law's own force, with a stiff contact on top where two bubbles overlap by more than EVEN allows.
+
+    It widens the smallest gaps, which decide how large a uniform hole can be, and leaves the rest of the balance alone.
+    """
+    return force_law(w) + STIFFNESS * np.maximum(EVEN - w, 0.0)
 
 
 def find_pairs(charts: Charts, points: Floats, row: Ints, pitch: Floats, skin: float) -> Pairs:
@@ -44,28 +56,52 @@ def find_pairs(charts: Charts, points: Floats, row: Ints, pitch: Floats, skin: f
 
     points: (n, 3) positions; row: (n,) region rows; pitch: (n,)
     """
-    region = charts.region
-    widest = float(pitch.max())
-    at = points if region.single_sheet else signature(region, points, row, widest)
-    reach = REACH + skin
+    at, reach, widest = _search_space(charts, points, row, pitch), REACH + skin, float(pitch.max())
     tree = cKDTree(at, balanced_tree=False, compact_nodes=False)
     if widest < 1.25 * pitch.min():
         first, second = tree.query_pairs(reach * widest, output_type="ndarray").T
     else:
-        first, second = _graded_pairs(tree, at, pitch, reach)
+        first, second = _nearest_pairs(tree, at, np.arange(len(at)), pitch, reach)
     stable = (pitch[first] + pitch[second]) / 2
     away = points[first] - points[second]
     close = np.einsum("mc,mc->m", away, away) < (reach * stable) ** 2
     return Pairs(first[close], second[close], stable[close])
 
 
-def _graded_pairs(tree: cKDTree, at: Floats, pitch: Floats, reach: float) -> tuple[Ints, Ints]:
-    """Candidate pairs where pitches differ much: the nearest of each bubble, so that small ones do not list hundreds."""
-    count = min(20, len(at))
-    distance, near = tree.query(at, k=count)
-    own = np.repeat(np.arange(len(at)), count)
-    near, distance = near.reshape(-1), distance.reshape(-1)
-    kept = (distance < reach * (pitch[own] + pitch[near]) / 2) & (own != near)
-    low, high = np.minimum(own, near)[kept], np.maximum(own, near)[kept]
-    code = np.unique(low * len(at) + high)
-    return code // len(at), code % len(at)
+def renewed_pairs(
+    pairs: Pairs, stale: Ints, charts: Charts, points: Floats, row: Ints, pitch: Floats, skin: float
+) -> Pairs:
+    """The same list where only the bubbles `stale` have moved by more than the skin allows."""
+    n = len(points)
+    moved = np.zeros(n, dtype=bool)
+    moved[stale] = True
+    kept = ~(moved[pairs.first] | moved[pairs.second])
+    at, reach = _search_space(charts, points, row, pitch), REACH + skin
+    tree = cKDTree(at, balanced_tree=False, compact_nodes=False)
+    first, second = _nearest_pairs(tree, at, stale, pitch, reach)
+    stable = (pitch[first] + pitch[second]) / 2
+    return Pairs(
+        np.concatenate([pairs.first[kept], first]),
+        np.concatenate([pairs.second[kept], second]),
+        np.concatenate([pairs.stable[kept], stable]),
+    )
+
+
+def _search_space(charts: Charts, points: Floats, row: Ints, pitch: Floats) -> Floats:
+    """Coordinates in which bubbles that feel each other are near, and those on facing sheets are not."""
+    region = charts.region
+    return points if region.single_sheet else signature(region, points, row, float(pitch.max()))
+
+
+def _nearest_pairs(tree: cKDTree, at: Floats, asked: Ints, pitch: Floats, reach: float) -> tuple[Ints, Ints]:
+    """Pairs with one of the bubbles `asked`, from the nearest of each, so that small ones among large list no hundreds."""
+    n = len(at)
+    count = min(MOST_NEAR, n)
+    distance, near = tree.query(at[asked], k=count, distance_upper_bound=reach * float(pitch.max()))
+    own, near, distance = np.repeat(asked, count), near.reshape(-1), distance.reshape(-1)
+    found = (near < n) & (near != own)
+    own, near, distance = own[found], near[found], distance[found]
+    close = distance < reach * (pitch[own] + pitch[near]) / 2
+    low, high = np.minimum(own, near)[close], np.maximum(own, near)[close]
+    code = np.unique(low * n + high)
+    return code // n, code % n

@@ -59,7 +59,7 @@ def pack_steps(region: Region, packing: Packing) -> Steps[tuple[Ground, Bubbles]
     yield Progress("Evening out the gaps", 0.8)
     local = local_pitch(ground, bubbles)
     bubbles, _ = relax(
-        ground, bubbles, local, STIFF_STEPS, packing.tolerance, stiff_law, quickest=0.75 / np.sqrt(STIFFNESS)
+        ground, bubbles, local, STIFF_STEPS, packing.tolerance, stiff_law, 1.0 + STIFFNESS
     )
     return ground, bubbles
 
