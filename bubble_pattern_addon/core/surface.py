@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .mesh import Floats, Ints
+from .mesh import Bools, Floats, Ints
 from .region import Region
 
 Complex = NDArray[np.complex128]
@@ -52,7 +52,7 @@ class Spots(NamedTuple):
     row: Ints
     barycentric: Floats
 
-    def take(self, which: Ints | NDArray[np.bool_]) -> Spots:
+    def take(self, which: Ints | Bools) -> Spots:
         """The places `which`."""
         return Spots(self.row[which], self.barycentric[which])
 
@@ -103,49 +103,74 @@ def to_space(charts: Charts, row: Ints, steps: Complex) -> Floats:
 
 
 def walk(charts: Charts, start: Spots, steps: Complex, carried: Complex | None = None) -> Walk:
-    """Walk straight from `start` by `steps` (n,), all at once: every pass takes everyone over at most one
-    edge.
+    """Walk straight from `start` by `steps` (n,), all at once: every pass takes everyone over at most one edge.
 
     Directions `carried` (n,) are transported along. A walk ends where it meets the boundary.
     """
-    row, bary = start.row.copy(), start.barycentric.copy()
-    left = steps.astype(np.complex128, copy=True)
-    carried = left.copy() if carried is None else carried.copy()
-    neighbours, opposite = charts.region.neighbours, charts.region.opposite
-    active = np.arange(len(row))
-    while len(active):
-        at, here, step = row[active], bary[active], left[active]
-        rate = np.real(np.conj(charts.gradients[at]) * step[:, None])
-        there = here + rate
-        leaving = there.min(axis=1) < INSIDE
-        inside = ~leaving
-        bary[active[inside]] = there[inside]
-        left[active[inside]] = 0
-        active, at, here = active[leaving], at[leaving], here[leaving]
-        step, rate = step[leaving], rate[leaving]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            share = np.where(here + rate < INSIDE, np.maximum(here, 0) / -rate, np.inf)
-        corner = share.argmin(axis=1)
-        pick = np.arange(len(active))
-        share = np.minimum(share[pick, corner], 1.0)
-        here = np.maximum(here + share[:, None] * rate, 0)
-        here[pick, corner] = 0
-        here /= here.sum(axis=1, keepdims=True)
+    row = start.row.copy()
+    carried = steps.astype(np.complex128) if carried is None else carried.astype(np.complex128)
+    rate = _rates(charts, row, steps)
+    bary = start.barycentric + rate
+    left = np.zeros(len(row), dtype=np.complex128)
+    out = np.flatnonzero(_outside(bary))
+    # Most steps end in the triangle they start in; from here on only the others are looked at.
+    at, here, step, rate = row[out], start.barycentric[out], steps[out], rate[out]
+    turned = np.ones(len(out), dtype=np.complex128)
+    while len(out):
+        here, corner, share = _to_edge(here, rate)
         step = step * (1 - share)
-        beyond, entry = neighbours[at, corner], opposite[at, corner]
+        beyond, entry = charts.region.neighbours[at, corner], charts.region.opposite[at, corner]
         stopped = beyond < 0
-        bary[active[stopped]], left[active[stopped]] = here[stopped], step[stopped]
-        crossing = ~stopped
-        active, pick = active[crossing], pick[crossing]
-        at, corner, beyond, entry = at[crossing], corner[crossing], beyond[crossing], entry[crossing]
-        crossed = np.zeros((len(active), 3))
-        order = np.arange(len(active))
-        crossed[order, (entry + 1) % 3] = here[pick, (corner + 2) % 3]
-        crossed[order, (entry + 2) % 3] = here[pick, (corner + 1) % 3]
+        if stopped.any():
+            ended = out[stopped]
+            row[ended], bary[ended], left[ended] = at[stopped], here[stopped], step[stopped]
+            carried[ended] *= turned[stopped]
+            going = ~stopped
+            out, at, here, step, turned = out[going], at[going], here[going], step[going], turned[going]
+            corner, beyond, entry = corner[going], beyond[going], entry[going]
         turn = charts.turns[at, corner]
-        row[active], bary[active], left[active] = beyond, crossed, step[pick] * turn
-        carried[active] *= turn
+        here, at, step, turned = _across(here, corner, entry), beyond, step * turn, turned * turn
+        rate = _rates(charts, at, step)
+        there = here + rate
+        outside = _outside(there)
+        inside = ~outside
+        ended = out[inside]
+        row[ended], bary[ended] = at[inside], there[inside]
+        carried[ended] *= turned[inside]
+        out, at, here, step = out[outside], at[outside], here[outside], step[outside]
+        turned, rate = turned[outside], rate[outside]
     return Walk(Spots(row, bary), carried, left)
+
+
+def _rates(charts: Charts, row: Ints, steps: Complex) -> Floats:
+    """Change (n, 3) of the barycentric coordinates over each step."""
+    gradients = charts.gradients[row]
+    return gradients.real * steps.real[:, None] + gradients.imag * steps.imag[:, None]
+
+
+def _outside(bary: Floats) -> Bools:
+    return (bary[:, 0] < INSIDE) | (bary[:, 1] < INSIDE) | (bary[:, 2] < INSIDE)
+
+
+def _to_edge(here: Floats, rate: Floats) -> tuple[Floats, Ints, Floats]:
+    """Where steps leave their triangles: place (n, 3), corner opposite to that edge (n,), share of the step made (n,)."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shares = np.where(here + rate < INSIDE, np.maximum(here, 0) / -rate, np.inf)
+    corner = shares.argmin(axis=1)
+    pick = np.arange(len(here))
+    share = np.minimum(shares[pick, corner], 1.0)
+    place = np.maximum(here + share[:, None] * rate, 0)
+    place[pick, corner] = 0
+    return place / place.sum(axis=1, keepdims=True), corner, share
+
+
+def _across(here: Floats, corner: Ints, entry: Ints) -> Floats:
+    """The same places on an edge as seen from the triangle beyond, whose corner `entry` lies opposite to it."""
+    pick = np.arange(len(here))
+    crossed = np.zeros_like(here)
+    crossed[pick, (entry + 1) % 3] = here[pick, (corner + 2) % 3]
+    crossed[pick, (entry + 2) % 3] = here[pick, (corner + 1) % 3]
+    return crossed
 
 
 def smooth_normals(region: Region, spots: Spots) -> Floats:

@@ -86,7 +86,7 @@ def relax(
     while done < iterations:
         pull = _pull(swarm, _links(swarm, np.flatnonzero(active)), law)
         stirred = active.copy()
-        stirred[active] = (pull**2).sum(axis=1) > quiet**2
+        stirred[active] = np.einsum("nc,nc->n", pull, pull) > quiet**2
         stirred &= everyone
         if not stirred.any():
             if active.all() or active is everyone:
@@ -206,7 +206,7 @@ def _block(
             velocity = pace * pull
             pace, mixing, downhill = 0.5 * pace, 0.1, 0
         step = pace * velocity
-        longest = np.sqrt((step**2).sum(axis=1).max(initial=0.0))
+        longest = np.sqrt(np.einsum("nc,nc->n", step, step).max(initial=0.0))
         if longest > LONGEST_STEP:
             step *= LONGEST_STEP / longest
         swarm.velocity[active] = velocity
