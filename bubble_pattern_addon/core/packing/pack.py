@@ -2,30 +2,30 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from ..boundary import make_boundary, nearest_boundary, signature
 from ..errors import RegionError
-from ..mesh import Floats, Ints
+from ..mesh import Floats
 from ..metric import Field, Places
 from ..progress import Progress, Steps
 from ..recipe import Packing
 from ..region import Region
-from ..surface import Charts, Spots, make_charts, positions, to_frame, to_space
+from ..surface import Charts, Complex, Spots, make_charts, positions, to_frame, walk
 from .bubbles import Bubbles, Ground, all_spots
 from .crowding import close_pairs, uncrowded
-from .force import STIFFNESS, force_law, stiff_law
+from .force import STIFFNESS, stiff_law
 from .lattice import grow
 from .population import control
 from .relax import relax
-from .rim import FirstRow, Track, first_row, inset_track, spots_on_track
+from .rim import FirstRow, Lengths, Track, first_row, inset_track, on_track, spots_on_track, straight_stretches
 
 # A recipe that asks for more bubbles than this is taken for a slip of the pen.
 MOST = 1_000_000
 # Lattice bubbles nearer to the boundary than this many pitches give way to the first row.
-CLEAR_OF_RIM = 1.05
+CLEAR_OF_RIM = 1.0
+# A straight stretch of the first row sets the lattice's direction when it is longer than this, in pitches.
+LONG_ENOUGH = 6.0
 # Bubbles of the first row closer than this, as across a narrow neck, do not both fit.
 TOO_CLOSE = 0.8
 # Rounds of relaxation and population control, and how many steps each may take; the last phases' steps.
@@ -69,7 +69,7 @@ def local_pitch(ground: Ground, bubbles: Bubbles) -> Floats:
     return ground.pitch(all_spots(ground, bubbles))
 
 
-def _pitch_over(region: Region, field: Field):  # type: ignore[no-untyped-def]
+def _pitch_over(region: Region, field: Field) -> Lengths:
     def pitch(spots: Spots) -> Floats:
         points = np.einsum("nk,nkc->nc", spots.barycentric, region.corners[spots.row])
         return field(Places(points, region.triangles[spots.row], spots.barycentric))
@@ -77,7 +77,7 @@ def _pitch_over(region: Region, field: Field):  # type: ignore[no-untyped-def]
     return pitch
 
 
-def _check_count(region: Region, pitch) -> None:  # type: ignore[no-untyped-def]
+def _check_count(region: Region, pitch: Lengths) -> None:
     """Raises RegionError where the pitch is no length, or so small that it means over a million bubbles."""
     rows = np.arange(len(region.triangles))
     local = pitch(Spots(rows, np.full((len(rows), 3), 1 / 3)))
@@ -93,7 +93,7 @@ def _check_count(region: Region, pitch) -> None:  # type: ignore[no-untyped-def]
         )
 
 
-def _ground(charts: Charts, pitch, edge_offset: float) -> Ground:  # type: ignore[no-untyped-def]
+def _ground(charts: Charts, pitch: Lengths, edge_offset: float) -> Ground:
     rim = charts.region.rim
     if not len(rim):
         nothing = np.empty(0)
@@ -134,9 +134,36 @@ def _lattice(ground: Ground, row: FirstRow, seed: int) -> Spots:
     return spots.take(distance > CLEAR_OF_RIM * local + ground.edge_offset)
 
 
-def _seeds(ground: Ground, seed: int) -> tuple[Spots, np.ndarray]:
-    """One start of the lattice for each connected part of the region: its middle, rows along its straightest edge."""
-    region, charts = ground.charts.region, ground.charts
+def _seeds(ground: Ground, seed: int) -> tuple[Spots, Complex]:
+    """One start of the lattice for each connected part of the region, and the direction of its rows.
+
+    A part with a straight edge starts there, so that lattice and first row are one; any other starts in its middle.
+    A `seed` other than 0 turns the middle ones and shifts all of them by chance, for another pattern of the same recipe.
+    """
+    charts, track = ground.charts, ground.track
+    seeds = _middles(charts.region)
+    directions = np.ones(len(seeds.row), dtype=np.complex128)
+    if len(track.arc):
+        middle, length, sheet = straight_stretches(charts, track)
+        order = np.lexsort((middle, -length, sheet))
+        best = order[np.concatenate([[True], np.diff(sheet[order]) != 0])]
+        best = best[length[best] > LONG_ENOUGH]
+        _, tangent, _ = on_track(track, middle[best])
+        on_rim = spots_on_track(charts, track, middle[best])
+        along = to_frame(charts, on_rim.row, tangent)
+        seeds.row[sheet[best]], seeds.barycentric[sheet[best]] = on_rim
+        directions[sheet[best]] = along / np.abs(along)
+    if seed:
+        chance = np.random.default_rng(seed)
+        directions *= np.exp(1j * chance.uniform(0, np.pi / 3, len(directions)))
+        shift = chance.uniform(-0.5, 0.5, (len(directions), 2)) @ np.array([1, 1j]) * ground.pitch(seeds)
+        walked = walk(charts, seeds, shift, carried=directions)
+        seeds, directions = walked.arrived, walked.carried
+    return seeds, directions
+
+
+def _middles(region: Region) -> Spots:
+    """The place nearest to the middle of each connected part of the region."""
     area = np.linalg.norm(region.area_vectors, axis=1)
     middle = region.corners.mean(axis=1)
     sheets = int(region.sheet.max()) + 1
@@ -145,6 +172,4 @@ def _seeds(ground: Ground, seed: int) -> tuple[Spots, np.ndarray]:
     away = np.linalg.norm(middle - centre[region.sheet], axis=1)
     order = np.lexsort((away, region.sheet))
     first = order[np.searchsorted(region.sheet[order], np.arange(sheets))]
-    seeds = Spots(first, np.full((sheets, 3), 1 / 3))
-    directions = np.exp(1j * np.random.default_rng(seed).uniform(0, np.pi / 3, sheets)) if seed else np.ones(sheets, complex)
-    return seeds, directions
+    return Spots(first, np.full((sheets, 3), 1 / 3))

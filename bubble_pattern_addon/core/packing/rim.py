@@ -20,6 +20,8 @@ SHARP = np.radians(40.0)
 CORNER_SCALE = 0.35
 # Bubbles of the first row are never spaced closer than this share of the pitch.
 CLOSEST = 0.92
+# A stretch of the first row is straight when it turns by less than this in all.
+STRAIGHT = np.radians(2.0)
 
 Lengths = Callable[[Spots], Floats]
 
@@ -370,3 +372,22 @@ def spots_on_track(charts: Charts, track: Track, arc: Floats) -> Spots:
     points, _, knot = on_track(track, arc)
     start = track.spots.take(knot)
     return walk(charts, start, to_frame(charts, start.row, points - track.points[knot])).arrived
+
+
+def straight_stretches(charts: Charts, track: Track) -> tuple[Floats, Floats, Ints]:
+    """Longest straight stretch from every knot on: arc of its middle (K,), length in pitches (K,), region sheet (K,).
+
+    Straight on the surface: the turning of the line in the tangent plane adds up to less than STRAIGHT.
+    """
+    along = np.diff(track.points, axis=0)
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
+    normals = charts.region.normals[track.spots.row]
+    turning = np.einsum("kc,kc->k", np.cross(along[:-1], along[1:]), normals[1:-1])
+    turned = np.concatenate([[0.0], np.cumsum(np.abs(turning)), [0.0]])
+    turned[-1] = turned[-2]
+    # From one line to the next nothing is straight.
+    turned += 10.0 * track.chain
+    end = np.searchsorted(turned, turned + STRAIGHT, side="right") - 1
+    end = np.minimum(end + 1, np.searchsorted(track.chain, track.chain, side="right") - 1)
+    middle = (track.arc + track.arc[end]) / 2
+    return middle, track.arc[end] - track.arc, charts.region.sheet[track.spots.row]
