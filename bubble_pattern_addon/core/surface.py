@@ -103,7 +103,8 @@ def to_space(charts: Charts, row: Ints, steps: Complex) -> Floats:
 
 
 def walk(charts: Charts, start: Spots, steps: Complex, carried: Complex | None = None) -> Walk:
-    """Walk straight from `start` by `steps` (n,), all at once: every pass takes everyone over at most one edge.
+    """Walk straight from `start` by `steps` (n,), all at once: every pass takes everyone over at most one
+    edge.
 
     Directions `carried` (n,) are transported along. A walk ends where it meets the boundary.
     """
@@ -153,7 +154,9 @@ def _outside(bary: Floats) -> Bools:
 
 
 def _to_edge(here: Floats, rate: Floats) -> tuple[Floats, Ints, Floats]:
-    """Where steps leave their triangles: place (n, 3), corner opposite to that edge (n,), share of the step made (n,)."""
+    """Where steps leave their triangles: place (n, 3), corner opposite to that edge (n,), share of the step
+    made (n,).
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
         shares = np.where(here + rate < INSIDE, np.maximum(here, 0) / -rate, np.inf)
     corner = shares.argmin(axis=1)
@@ -165,7 +168,9 @@ def _to_edge(here: Floats, rate: Floats) -> tuple[Floats, Ints, Floats]:
 
 
 def _across(here: Floats, corner: Ints, entry: Ints) -> Floats:
-    """The same places on an edge as seen from the triangle beyond, whose corner `entry` lies opposite to it."""
+    """The same places on an edge as seen from the triangle beyond, whose corner `entry` lies opposite
+    to it.
+    """
     pick = np.arange(len(here))
     crossed = np.zeros_like(here)
     crossed[pick, (entry + 1) % 3] = here[pick, (corner + 2) % 3]

@@ -1,4 +1,6 @@
-"""The bubbles while they are packed: those of the first row on their track, the others free on the surface."""
+"""The bubbles while they are packed: those of the first row on their track, the others free on the
+surface.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +16,9 @@ from .rim import FirstRow, Lengths, Track, on_track, spots_on_track
 
 @dataclass(frozen=True)
 class Ground:
-    """What bubbles are packed on: the surface, its boundary (None where there is none), the first row's track, the
-    packing metric at places and the edge offset."""
+    """What bubbles are packed on: the surface, its boundary (None where there is none), the first row's
+    track, the packing metric at places and the edge offset.
+    """
 
     charts: Charts
     boundary: Boundary | None
@@ -26,7 +29,9 @@ class Ground:
 
 @dataclass(frozen=True)
 class Bubbles:
-    """first_row: m bubbles on the track; free: places of the k others. Arrays over all bubbles have the first row first."""
+    """first_row: m bubbles on the track; free: places of the k others. Arrays over all bubbles have the first
+    row first.
+    """
 
     first_row: FirstRow
     free: Spots
@@ -41,7 +46,8 @@ def all_spots(ground: Ground, bubbles: Bubbles) -> Spots:
         return bubbles.free
     rim = spots_on_track(ground.charts, ground.track, bubbles.first_row.wrapped())
     return Spots(
-        np.concatenate([rim.row, bubbles.free.row]), np.concatenate([rim.barycentric, bubbles.free.barycentric])
+        np.concatenate([rim.row, bubbles.free.row]),
+        np.concatenate([rim.barycentric, bubbles.free.barycentric]),
     )
 
 

@@ -36,17 +36,19 @@ class Pairs(NamedTuple):
 def force_law(w: Floats) -> Floats:
     """l0/k0 times the force at the relative distance w = d/l0, (m,): repulsive when positive.
 
-    The bounded cubic 5/4 w^3 - 19/8 w^2 + 9/8 for 0 <= w < 1.5, else 0: the only cubic with f(1) = 0, f(1.5) = 0,
-    f'(0) = 0 whose slope at contact is -1 (Shimada and Gossard, "Bubble Mesh", 1995; the paper's Eq. 1).
+    The bounded cubic 5/4 w^3 - 19/8 w^2 + 9/8 for 0 <= w < 1.5, else 0: the only cubic with f(1) = 0, f(1.5)
+    = 0, f'(0) = 0 whose slope at contact is -1 (Shimada and Gossard, "Bubble Mesh", 1995; the paper's Eq. 1).
     """
     w = np.minimum(w, REACH)
     return (1.25 * w - 2.375) * (w * w) + 1.125
 
 
 def stiff_law(w: Floats) -> Floats:
-    """l0/k0 times the law's own force, with a stiff contact on top where two bubbles overlap by more than EVEN allows.
+    """l0/k0 times the law's own force, with a stiff contact on top where two bubbles overlap by more than
+    EVEN allows.
 
-    It widens the smallest gaps, which decide how large a uniform hole can be, and leaves the rest of the balance alone.
+    It widens the smallest gaps, which decide how large a uniform hole can be, and leaves the rest of the
+    balance alone.
     """
     return force_law(w) + STIFFNESS * np.maximum(EVEN - w, 0.0)
 
@@ -94,7 +96,9 @@ def _search_space(charts: Charts, points: Floats, row: Ints, pitch: Floats) -> F
 
 
 def _nearest_pairs(tree: cKDTree, at: Floats, asked: Ints, pitch: Floats, reach: float) -> tuple[Ints, Ints]:
-    """Pairs with one of the bubbles `asked`, from the nearest of each, so that small ones among large list no hundreds."""
+    """Pairs with one of the bubbles `asked`, from the nearest of each, so that small ones among large list no
+    hundreds.
+    """
     n = len(at)
     count = min(MOST_NEAR, n)
     distance, near = tree.query(at[asked], k=count, distance_upper_bound=reach * float(pitch.max()))

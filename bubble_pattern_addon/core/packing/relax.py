@@ -1,8 +1,9 @@
 """Relaxation of the bubbles to a static balance of forces along the surface (paper, Eq. 2).
 
-FIRE (Bitzek, Koskinen, Gaehler, Moseler, Gumbsch, "Structural Relaxation Made Simple", 2006) reaches the equilibrium of the
-paper's damped motion with far fewer force evaluations; `rk4` beside it integrates that motion and is the reference. Most
-bubbles of a hexagonal start hardly move, so only those that feel a force, and their neighbours, are worked on.
+FIRE (Bitzek, Koskinen, Gaehler, Moseler, Gumbsch, "Structural Relaxation Made Simple", 2006) reaches the
+equilibrium of the paper's damped motion with far fewer force evaluations; `rk4` beside it integrates that
+motion and is the reference. Most bubbles of a hexagonal start hardly move, so only those that feel a force,
+and their neighbours, are worked on.
 """
 
 from __future__ import annotations
@@ -18,14 +19,15 @@ from .bubbles import Bubbles, Ground, points_and_rows, with_arc
 from .force import Law, Pairs, find_pairs, force_law, renewed_pairs
 from .rim import on_track
 
-# Pairs are listed with this reserve, in pitches (small enough to leave a lattice's next shell out, at 1.73), and a bubble's
-# are listed anew when it has moved by half of that.
+# Pairs are listed with this reserve, in pitches (small enough to leave a lattice's next shell out, at 1.73),
+# and a bubble's are listed anew when it has moved by half of that.
 SKIN = 0.16
 # No bubble moves farther than this in a step, in pitches.
 LONGEST_STEP = 0.12
 # Steps between two looks at all bubbles, to see who feels a force.
 BLOCK = 10
-# FIRE's longest time step where contacts have the law's own stiffness (the lattice swings with at most sqrt(6) per unit).
+# FIRE's longest time step where contacts have the law's own stiffness (the lattice swings with at most
+# sqrt(6) per unit).
 QUICKEST = 0.75
 
 
@@ -42,8 +44,8 @@ class Work:
 class _Swarm:
     """The bubbles as arrays that the relaxation writes to, the first row (m of them) first.
 
-    points, row: (n, 3), (n,); bary: (n, 3), of the free ones; arc: (m,); tangent: (m, 3); velocity: (n, 3) per pitch;
-    pairs are valid while no bubble is farther than half the skin from where it was listed
+    points, row: (n, 3), (n,); bary: (n, 3), of the free ones; arc: (m,); tangent: (m, 3); velocity: (n, 3)
+    per pitch; pairs are valid while no bubble is farther than half the skin from where it was listed
     """
 
     ground: Ground
@@ -70,10 +72,11 @@ def relax(
     stiffness: float = 1.0,
     moving: Bools | None = None,
 ) -> tuple[Bubbles, Work]:
-    """Bubbles in balance: FIRE until a step would move none by more than `tolerance` pitches, or for `iterations` steps.
+    """Bubbles in balance: FIRE until a step would move none by more than `tolerance` pitches, or for
+    `iterations` steps.
 
-    pitch: (n,) the bubbles' local pitch, held for the time of the relaxation; stiffness: of the law's contact, relative
-    to the paper's. Bubbles for which `moving` (n,) is false stay where they are.
+    pitch: (n,) the bubbles' local pitch, held for the time of the relaxation; stiffness: of the law's
+    contact, relative to the paper's. Bubbles for which `moving` (n,) is false stay where they are.
     """
     swarm = _swarm(ground, bubbles, pitch)
     pace, mixing, downhill = 0.5 * QUICKEST / np.sqrt(stiffness), 0.1, 0
@@ -96,7 +99,9 @@ def relax(
         active = _with_neighbours(swarm, stirred, pull, quiet) & everyone
         swarm.velocity[~active] = 0
         block = min(BLOCK, iterations - done)
-        pace, mixing, downhill = _block(swarm, np.flatnonzero(active), law, block, pace, mixing, downhill, quickest)
+        pace, mixing, downhill = _block(
+            swarm, np.flatnonzero(active), law, block, pace, mixing, downhill, quickest
+        )
         done += block
         if done % (3 * BLOCK) == 0:
             active = everyone
@@ -155,8 +160,8 @@ def _links(swarm: _Swarm, active: Ints) -> _Links:
 def _pull(swarm: _Swarm, links: _Links, law: Law) -> Floats:
     """Accelerations (a, 3) of the active bubbles along the surface, in units of the local pitch.
 
-    The contact stiffness is k0/l0^2; with masses of 1/pitch^2 bubbles of all sizes swing at the same pace, and the
-    balance, where the forces vanish, is that of the law.
+    The contact stiffness is k0/l0^2; with masses of 1/pitch^2 bubbles of all sizes swing at the same pace,
+    and the balance, where the forces vanish, is that of the law.
     """
     pairs, active = links.pairs, links.active
     swarm.work.evaluations += 1
@@ -189,7 +194,14 @@ def _with_neighbours(swarm: _Swarm, stirred: Bools, pull: Floats, quiet: float) 
 
 
 def _block(
-    swarm: _Swarm, active: Ints, law: Law, steps: int, pace: float, mixing: float, downhill: int, quickest: float
+    swarm: _Swarm,
+    active: Ints,
+    law: Law,
+    steps: int,
+    pace: float,
+    mixing: float,
+    downhill: int,
+    quickest: float,
 ) -> tuple[float, float, int]:
     """Some steps of FIRE on the active bubbles; returns its time step, mixing and count of steps downhill."""
     links = _links(swarm, active)
@@ -217,12 +229,16 @@ def _block(
 
 
 def _dot(a: Floats, b: Floats) -> float:
-    """Inner product of two (n, 3) arrays; not by BLAS, whose threads wait for one another on a busy machine."""
+    """Inner product of two (n, 3) arrays; not by BLAS, whose threads wait for one another on a busy
+    machine.
+    """
     return float(np.einsum("nc,nc->", a, b))
 
 
 def _list_anew(swarm: _Swarm, active: Ints) -> bool:
-    """Find the pairs of those bubbles anew that have moved by half the skin since they were listed; whether any had."""
+    """Find the pairs of those bubbles anew that have moved by half the skin since they were listed; whether
+    any had.
+    """
     away = swarm.points[active] - swarm.listed_at[active]
     shift = np.einsum("ac,ac->a", away, away) / swarm.pitch[active] ** 2
     if shift.max(initial=0.0) < (SKIN / 2) ** 2:
@@ -240,7 +256,9 @@ def _list_anew(swarm: _Swarm, active: Ints) -> bool:
 
 
 def _move(swarm: _Swarm, active: Ints, steps: Floats) -> None:
-    """Move the active bubbles by `steps` (a, 3): the first row slides along its track, the others walk on the surface."""
+    """Move the active bubbles by `steps` (a, 3): the first row slides along its track, the others walk on the
+    surface.
+    """
     m = len(swarm.arc)
     rim = int(np.searchsorted(active, m))
     sliding, free = active[:rim], active[rim:] - m

@@ -375,7 +375,8 @@ def spots_on_track(charts: Charts, track: Track, arc: Floats) -> Spots:
 
 
 def straight_stretches(charts: Charts, track: Track) -> tuple[Floats, Floats, Ints]:
-    """Longest straight stretch from every knot on: arc of its middle (K,), length in pitches (K,), region sheet (K,).
+    """Longest straight stretch from every knot on: arc of its middle (K,), length in pitches (K,), region
+    sheet (K,).
 
     Straight on the surface: the turning of the line in the tangent plane adds up to less than STRAIGHT.
     """
