@@ -47,6 +47,34 @@ def whole_faces(triangles: Ints, face: Ints, base: Ints) -> tuple[Bools, Ints]:
     return whole, (np.arange(3) + turned[:, None]) % 3
 
 
+def drift(part: Mesh, face: Ints, named: Ints, changed: Ints, base: Mesh) -> float:
+    """How far the surface may have moved where the part has the faces `changed` of `base`, (k,), in other
+    pieces than the base has.
+
+    face: (T',) triangle of the base each triangle of the part lies on, below 0 for none; named: (V',) vertex
+    of the base at each of the part's, below 0 for new ones. The largest of: how far the pieces' corners lie
+    off the face's plane, the width of what they miss of its area or add to it, and the width of a face
+    without any piece. Infinite where a piece has a corner that is not the base's.
+    """
+    asked = np.zeros(len(base.triangles), dtype=bool)
+    asked[changed] = True
+    piece = np.flatnonzero(face >= 0)
+    piece = piece[asked[face[piece]]]
+    if np.any(named[part.triangles[piece]] < 0):
+        return np.inf
+    plane = base.area_vectors
+    area = np.linalg.norm(plane, axis=1)
+    corners = base.corners[changed]
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    made = np.linalg.norm(Mesh(part.vertices, part.triangles[piece]).area_vectors, axis=1)
+    covered = np.bincount(face[piece], weights=made, minlength=len(area))[changed]
+    width = np.abs(covered - area[changed]) / np.where(longest > 0, longest, 1)
+    normal = plane / np.where(area > 0, area, 1)[:, None]
+    offset = part.corners[piece] - base.vertices[base.triangles[face[piece], 0]][:, None]
+    off = np.abs(np.einsum("mck,mk->mc", offset, normal[face[piece]]))
+    return float(max(width.max(initial=0), off.max(initial=0)))
+
+
 def carry_corners(base: Mesh, part: Mesh, source: Ints, values: Floats) -> Floats:
     """Values on the corners of the base carried to the part: (T, 3, k) -> (T', 3, k), linear on each base
     triangle.

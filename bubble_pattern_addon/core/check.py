@@ -18,8 +18,9 @@ class Check:
     bodies, base_bodies: closed shells round material; cavities: shells round enclosed hollows
     volume, base_volume, removed_volume: in cubic units
     through: holes that pierce their wall
-    unchanged: every face of the base that no feature touches came out as it went in
+    unchanged: the base's surface is the same wherever no feature touches it
     problems: one sentence each; empty when the part is good
+    notes: one sentence each on what is worth knowing and does no harm
     """
 
     watertight: bool
@@ -35,6 +36,7 @@ class Check:
     through: int
     unchanged: bool
     problems: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
     @property
     def good(self) -> bool:
@@ -42,7 +44,9 @@ class Check:
         return not self.problems
 
 
-def check_part(mesh: Mesh, base: Mesh, through: int, unchanged: bool, problems: list[str]) -> Check:
+def check_part(
+    mesh: Mesh, base: Mesh, through: int, unchanged: bool, problems: list[str], notes: list[str]
+) -> Check:
     """Measure the part `mesh` made from `base` with `through` through-holes; what is wrong comes after
     `problems`.
     """
@@ -79,4 +83,5 @@ def check_part(mesh: Mesh, base: Mesh, through: int, unchanged: bool, problems: 
         through=through,
         unchanged=unchanged,
         problems=tuple(problems),
+        notes=tuple(notes),
     )

@@ -40,7 +40,8 @@ def make_report(region: Region, pattern: Pattern, part: Part, seconds: Mapping[s
 
     features, watertight, genus, volume, open_area, min_web, min_margin, quality{six, psi6, gap_cv, gap_min,
     rim_cv} and seconds{region, pack, shape, add}; further wall{min, max}, the near wall's thickness at the
-    features, and problems, one sentence each, empty when the part is good.
+    features, problems, one sentence each, empty when the part is good, and notes, likewise, on what does no
+    harm.
     """
     figures: Quality = measure(pattern, region)
     thickness = part.thickness[np.isfinite(part.thickness)]
@@ -69,6 +70,7 @@ def make_report(region: Region, pattern: Pattern, part: Part, seconds: Mapping[s
         },
         "seconds": {stage: round(value, 4) for stage, value in seconds.items()},
         "problems": list(part.check.problems),
+        "notes": list(part.check.notes),
     }
     cleaned = _without_nonsense(report)
     assert isinstance(cleaned, dict)

@@ -12,6 +12,7 @@ from .boxtree import build_tree
 from .check import Check, check_part
 from .closed import patch_euler
 from .collision import colliding
+from .crossings import SHALLOWEST
 from .errors import BaseError, RecipeError
 from .feature import Cutters, make_cutters
 from .mesh import Bools, Floats, Ints, Mesh
@@ -193,28 +194,36 @@ def _judge(base: Mesh, feature: Feature, plan: Plan, mesh: Mesh, facet: Ints) ->
     if len(torn):
         state = "do not pierce one wall cleanly" if feature.depth is None else "have no clean floor and wall"
         problems.append(f"{len(torn):,} holes {state}, the first is {_place(plan.pattern, int(torn[0]))}.")
-    unchanged = _unchanged(plan, mesh, facet, named, whole)
-    check = check_part(mesh, sound.mesh, int(pierced.sum()), unchanged, problems)
+    unchanged, notes = _unchanged(plan, mesh, facet, named, whole)
+    check = check_part(mesh, sound.mesh, int(pierced.sum()), unchanged, problems, notes)
     return Part(mesh, source, vertex, whole, plan.wall.thickness, pierced, failures, check)
 
 
-def _unchanged(plan: Plan, mesh: Mesh, facet: Ints, named: Ints, whole: Bools) -> bool:
-    """Is the surface the same wherever no cutter reaches?
+def _unchanged(plan: Plan, mesh: Mesh, facet: Ints, named: Ints, whole: Bools) -> tuple[bool, list[str]]:
+    """Is the surface the same wherever no cutter reaches? And a note where it is, but in other faces.
 
-    Every face there must come out whole; or, beside faces without area, which the boolean dissolves into
-    their neighbours, in pieces that have only corners of the base and together the face's area.
+    Every face there must come out whole. Only faces narrower than what single precision in a file can hold
+    may be dissolved into their neighbours, as the boolean does with slivers and folds.
     """
     base = plan.sound.mesh
-    changed = np.ones(len(base.triangles), dtype=bool)
-    changed[facet[whole]] = False
-    changed[plan.wall.seen_triangle[plan.meets]] = False
-    doubtful = np.flatnonzero(facet >= 0)
-    doubtful = doubtful[changed[facet[doubtful]]]
-    area = np.linalg.norm(base.area_vectors, axis=1)
-    pieces = np.linalg.norm(Mesh(mesh.vertices, mesh.triangles[doubtful]).area_vectors, axis=1)
-    covered = np.bincount(facet[doubtful], weights=pieces, minlength=len(area))
-    named_only = np.all(named[mesh.triangles[doubtful]] >= 0)
-    return bool(named_only and np.all(np.abs(covered - area)[changed] <= 1e-9 * area[changed]))
+    other = np.ones(len(base.triangles), dtype=bool)
+    other[facet[whole]] = False
+    other[plan.wall.seen_triangle[plan.meets]] = False
+    changed = np.flatnonzero(other)
+    if len(changed) == 0:
+        return True, []
+    slack = SHALLOWEST * float(np.linalg.norm(np.ptp(base.vertices, axis=0)))
+    moved = carry.drift(mesh, facet, named, changed, base)
+    if moved > slack:
+        return False, []
+    lost = int((np.bincount(facet[facet >= 0], minlength=len(other))[changed] == 0).sum())
+    if lost == 0:
+        return True, []
+    faces = "1 face" if lost == 1 else f"{lost:,} faces"
+    return True, [
+        f"{faces} of the base narrower than {slack:.1g} merged into the neighbours; "
+        f"the surface moved there by at most {moved:.1g}."
+    ]
 
 
 def _wall_shapes(plan: Plan, mesh: Mesh, facet: Ints) -> Floats:

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from bubble_pattern_addon.core import solid
 from bubble_pattern_addon.core.errors import BaseError, RecipeError
 from bubble_pattern_addon.core.mesh import Mesh
 from bubble_pattern_addon.core.pattern import Pattern
@@ -346,6 +347,68 @@ def test_the_flat_face_stays_flat_and_its_neighbours_whole_however_many_holes():
     reach = np.linalg.norm(made[:, None, :2] - pattern.position[:, :2], axis=2).min(axis=1)
     assert reach.min() > 0.25 * np.cos(np.pi / 16) - 1e-9
     assert reach.max() < 0.25 + 1e-9
+
+
+def folded(depth: float) -> Mesh:
+    """A plate whose upper face has a sliver folded back over its diagonal, `depth` high at its middle."""
+    base = plate()
+    one, other = (int(k) for k in np.flatnonzero((base.vertices[base.triangles][..., 2] == 0).all(axis=1)))
+    first, second = base.triangles[one], base.triangles[other]
+    shared = [corner for corner in first if corner in second]
+    a, b = shared if list(first).index(shared[1]) == (list(first).index(shared[0]) + 1) % 3 else shared[::-1]
+    c, d = (int(np.setdiff1d(face, shared)[0]) for face in (first, second))
+    corners = base.vertices
+    middle = 0.55 * corners[a] + 0.45 * corners[b]
+    middle += depth * (corners[c] - middle) / np.linalg.norm(corners[c] - middle)
+    new = len(corners)
+    faces = [[a, b, c], [b, a, new], [b, new, d], [new, a, d]]
+    return Mesh(
+        np.concatenate([corners, middle[None]]),
+        np.concatenate([np.delete(base.triangles, [one, other], axis=0), faces]),
+    )
+
+
+@pytest.mark.parametrize("depth", [1e-9, 1e-7, 1e-5])
+def test_a_folded_sliver_dissolves_without_harm_and_is_told(depth):
+    base = folded(depth)
+    sliver = len(base.triangles) - 3
+    part = make(base, laid([[12, 2, 0]], UP, 3, 1.8))
+    assert_good(part, base, 1)
+    assert sliver not in part.source
+    assert part.check.notes[0].startswith("1 face of the base narrower than")
+
+
+@pytest.mark.parametrize("harm", ["swap", "move", "dent"])
+def test_a_change_where_no_hole_is_is_a_problem(monkeypatch, harm):
+    base = slab(12)
+    whole = solid.subtract
+
+    def harmed(*given):
+        mesh, facet = whole(*given)
+        vertices, triangles = mesh.vertices.copy(), mesh.triangles.copy()
+        one, other = (int(np.flatnonzero(facet == k)[0]) for k in (0, 144))
+        if harm == "swap":
+            # the other diagonal of a square that is not flat
+            a, b, c, d = base_square
+            names = [int(np.flatnonzero((vertices == base.vertices[k]).all(axis=1))[0]) for k in (a, b, c, d)]
+            triangles[one], triangles[other] = np.array(names)[[0, 1, 3]], np.array(names)[[1, 2, 3]]
+        elif harm == "move":
+            vertices[triangles[one, 0]] += 1e-3
+        else:
+            middle = len(vertices)
+            vertices = np.concatenate([vertices, [vertices[triangles[one]].mean(axis=0) - [0, 0, 1e-3]]])
+            a, b, c = triangles[one]
+            triangles = np.concatenate([triangles, [[b, c, middle], [c, a, middle]]])
+            triangles[one] = [a, b, middle]
+            facet = np.concatenate([facet, [facet[one]] * 2])
+        return Mesh(vertices, triangles), facet
+
+    base_square = [*base.triangles[0], base.triangles[144, 2]]
+    monkeypatch.setattr(solid, "subtract", harmed)
+    part = make(base, laid([[0, 0, 4.0]], UP, 3, 0.5))
+    assert part.check.watertight
+    assert not part.check.unchanged
+    assert "no hole touches were changed" in " ".join(part.check.problems)
 
 
 def test_vertices_written_once_per_face_make_no_difference():
