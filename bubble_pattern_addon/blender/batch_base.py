@@ -31,7 +31,7 @@ from .properties import is_pattern, recipe_of
 from .provenance import Original, read_original
 from .reading import Base, evaluated_mesh, transformed
 from .reading import read_base as read_object
-from .target_region import ATTRIBUTE, store
+from .target_region import ATTRIBUTE, on_marked_side, store
 
 if TYPE_CHECKING:
     from ..batch import Run
@@ -81,7 +81,8 @@ def read_base(path: Path | None) -> LoadedBase:
         obj = base_object()
         with evaluated_mesh(obj, bpy.context.evaluated_depsgraph_get()) as mesh:
             base = read_object(obj, mesh, WORLD)
-    return BlendBase(base.mesh, base.attributes, base.materials, obj.name)
+        marks = {name: on_marked_side(obj, base, name, mask) for name, mask in base.attributes.items()}
+    return BlendBase(base.mesh, marks, base.materials, obj.name)
 
 
 def base_object() -> bpy.types.Object:

@@ -42,9 +42,10 @@ from .properties import (
 )
 from .provenance import Original, read_original
 from .reading import Base, evaluated_mesh, read_base
+from .target_region import on_marked_side
 
 # A pattern that took longer than this is not laid anew at every change of a setting.
-LIVE_SECONDS = 0.5
+LIVE_SECONDS = 1.0
 
 
 @dataclass(frozen=True)
@@ -94,7 +95,7 @@ def read_source(obj: bpy.types.Object, attribute: str, context: bpy.types.Contex
     with shown(obj, context), evaluated_mesh(obj, context.evaluated_depsgraph_get()) as mesh:
         base = read_base(obj, mesh)
     selected = select(base.mesh, RegionChoice(attribute=attribute), base.attributes)
-    return source_of(base, selected)
+    return source_of(base, on_marked_side(obj, base, attribute, selected))
 
 
 def source_of(base: Base, selected: Bools) -> Source:

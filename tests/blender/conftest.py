@@ -28,6 +28,15 @@ def addon() -> Iterator[None]:
 
 
 @pytest.fixture(autouse=True)
+def patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Patterns answer changes at once, however busy the machine is."""
+    if HAS_BPY:
+        from bubble_pattern_addon.blender import generation
+
+        monkeypatch.setattr(generation, "LIVE_SECONDS", float("inf"))
+
+
+@pytest.fixture(autouse=True)
 def empty_file(addon: None) -> None:
     """An empty file."""
     import bpy

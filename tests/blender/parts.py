@@ -54,6 +54,15 @@ def panel(size: float = 0.2, cells: int = 24, thickness: float = 0.004) -> bpy.t
     return obj
 
 
+def sheet(size: float = 0.2, cells: int = 24) -> bpy.types.Object:
+    """A surface curved both ways that has no thickness, its faces up."""
+    bpy.ops.mesh.primitive_grid_add(size=size, x_subdivisions=cells, y_subdivisions=cells)
+    obj = bpy.context.object
+    for vertex in obj.data.vertices:
+        vertex.co.z = 0.1 * size * np.cos(vertex.co.x / size * 2) * np.cos(vertex.co.y / size * 2)
+    return obj
+
+
 def activate(obj: bpy.types.Object) -> None:
     """Select `obj` alone and make it active."""
     bpy.context.view_layer.update()

@@ -11,16 +11,21 @@ bpy = pytest.importorskip("bpy", reason="needs the bpy module: python scripts/te
 
 from mathutils import Euler, Matrix  # noqa: E402
 
+from bubble_pattern_addon.blender.properties import pattern_of  # noqa: E402
+
 from .parts import (  # noqa: E402
     activate,
     add_on_top,
     closest_pair,
+    euler,
+    is_closed,
     off_surface,
     on_top,
     panel,
     plate,
     points,
     select_faces,
+    sheet,
 )
 
 
@@ -166,8 +171,9 @@ def test_preview_shows_every_feature_in_its_size_and_direction() -> None:
     assert np.allclose(sizes, pattern.bubble_pattern.diameter, rtol=1e-4)
     axes = matrices[:, :3, 2] / sizes[:, 2:]
     assert np.allclose(axes, points(pattern, "normal"), atol=1e-4)
-    along = matrices[:, :3, 0] / sizes[:, :1]
-    assert np.allclose(along, points(pattern, "tangent"), atol=1e-4)
+    along, tangent = matrices[:, :3, 0] / sizes[:, :1], points(pattern, "tangent")
+    tangent -= (tangent * axes).sum(axis=1, keepdims=True) * axes
+    assert np.allclose(along, tangent / np.linalg.norm(tangent, axis=1, keepdims=True), atol=1e-4)
 
 
 def test_a_second_pattern_has_a_region_of_its_own() -> None:
@@ -235,3 +241,42 @@ def test_assigning_another_region() -> None:
     select_faces(base, lambda face: face.normal.x > 0.7)
     assert bpy.ops.bubble_pattern.region_assign() == {'FINISHED'}
     assert np.allclose(points(pattern, "normal"), [1, 0, 0])
+
+
+@pytest.mark.parametrize("offset", [-1, 0, 1])
+@pytest.mark.parametrize("whole", [True, False], ids=["whole sheet", "part of a sheet"])
+def test_a_solidified_sheet_is_filled_on_the_side_it_faced(offset: int, whole: bool) -> None:
+    base = sheet()
+    wall = base.modifiers.new("Wall", 'SOLIDIFY')
+    wall.thickness, wall.offset = 0.003, offset
+    select_faces(base, lambda face: whole or face.calc_center_median().length < 0.06)
+    bpy.ops.bubble_pattern.add()
+    pattern = pattern_of(bpy.context.object)
+    assert (points(pattern, "normal")[:, 2] > 0.5).all()
+    assert off_surface(pattern, base)[0] < 1e-6
+    assert bpy.ops.bubble_pattern.apply() == {'FINISHED'}
+    part = bpy.context.object.data
+    assert is_closed(part)
+    assert euler(part) == 2 - 2 * pattern.bubble_pattern.count
+    assert pattern.bubble_pattern.verdict == ""
+
+
+def test_both_sides_selected_by_hand_are_both_filled() -> None:
+    base = plate()
+    base.modifiers.new("Fine", 'SUBSURF').subdivision_type = 'SIMPLE'
+    passed = bpy.data.node_groups.new("Passed", 'GeometryNodeTree')
+    for way in ('INPUT', 'OUTPUT'):
+        passed.interface.new_socket("Geometry", in_out=way, socket_type='NodeSocketGeometry')
+    ends = passed.nodes.new('NodeGroupInput'), passed.nodes.new('NodeGroupOutput')
+    passed.links.new(ends[0].outputs[0], ends[1].inputs[0])
+    base.modifiers.new("Nodes", 'NODES').node_group = passed
+    select_faces(base, lambda face: abs(face.normal.z) > 0.7)
+    bpy.ops.bubble_pattern.add()
+    pattern = pattern_of(bpy.context.object)
+    up = points(pattern, "normal")[:, 2]
+    assert (up > 0.5).sum() == (up < -0.5).sum() > 100
+    pattern.bubble_pattern.depth_mode = 'BLIND'
+    pattern.bubble_pattern.depth = 0.002
+    assert bpy.ops.bubble_pattern.apply() == {'FINISHED'}
+    assert pattern.bubble_pattern.verdict == ""
+    assert euler(bpy.context.object.data) == 2

@@ -35,6 +35,9 @@ assert addon_utils.enable(name, default_set=True) is not None, "not enabled"
 warnings = addon_utils._extensions_warnings_get()
 bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
 bpy.ops.mesh.primitive_cube_add(size=0.1)
+cube = bpy.context.object.data
+marked = cube.attributes.new("bubble_region", 'BOOLEAN', 'FACE')
+marked.data.foreach_set("value", [face.normal.z > 0.7 for face in cube.polygons])
 bpy.ops.bubble_pattern.add()
 bpy.ops.bubble_pattern.apply()
 part = bpy.context.object.data
