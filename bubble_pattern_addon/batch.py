@@ -25,12 +25,13 @@ from .core.mesh import Bools
 from .core.metric import Constant
 from .core.pattern import Pattern
 from .core.pipeline import pattern_steps
-from .core.progress import Progress, Steps, drive
+from .core.progress import Progress, Steps, drive, within
 from .core.quality import min_margin, min_web
 from .core.recipe import Recipe, default_recipe, load_recipe, recipe_to_toml
 from .core.region import Region, make_region
 from .core.selection import select
 from .core.solid import Part, part_steps
+from .core.soundness import sound_base
 
 EXAMPLE = """\
 example of a recipe:
@@ -91,10 +92,11 @@ def run_steps(base: LoadedBase, recipe_file: Path) -> Steps[Run]:
     segments = region.boundary_segments
     perimeter = float(np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1).sum())
     recipe = load_recipe(recipe_file, default_recipe(region.area, perimeter))
+    sound_base(base.mesh)  # step 3 looks again; but nobody shall wait for a packing to be told of a hole
     clock.stop("region")
-    pattern = yield from clock.timed(pattern_steps(region, recipe))
+    pattern = yield from clock.timed(within(pattern_steps(region, recipe), 0.0, 0.5))
     check_limits(recipe, region, pattern)
-    part = yield from part_steps(base.mesh, pattern, recipe.feature)
+    part = yield from within(part_steps(base.mesh, pattern, recipe.feature), 0.5, 1.0)
     clock.stop("add")
     report = make_report(region, pattern, part, clock.seconds)
     if part.check.problems:

@@ -88,7 +88,7 @@ def write_base(path: Path, panel: DoorPanel) -> None:
     mesh.materials.append(
         make_material("Moulded plastic", (0.018, 0.019, 0.021), roughness=0.42, grain=0.04, grain_size=0.5)
     )
-    mesh.materials.append(make_material("Grille", (0.10, 0.105, 0.115), metallic=0.9, roughness=0.34))
+    mesh.materials.append(make_material("Grille", (0.20, 0.208, 0.224), metallic=0.75, roughness=0.42))
     mesh.materials.append(make_material("Badge", (0.62, 0.63, 0.65), metallic=1.0, roughness=0.22))
     material = np.where(panel.island, 2, panel.region).astype(np.int32)
     mesh.polygons.foreach_set("material_index", material)
@@ -108,6 +108,10 @@ def shown() -> Any:
     import bpy
     from tqdm import tqdm
 
+    from bubble_pattern_addon.batch import line_on
+
+    if not sys.stderr.isatty():
+        return line_on(sys.stderr)
     bar = tqdm(total=100, leave=False, bar_format="{desc:<24}{percentage:3.0f}% |{bar}| {elapsed}")
 
     def show(progress: Any) -> None:

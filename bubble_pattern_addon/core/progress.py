@@ -21,6 +21,16 @@ Result = TypeVar("Result")
 Steps = Generator[Progress, None, Result]
 
 
+def within(steps: Steps[Result], low: float, high: float) -> Steps[Result]:
+    """Pass `steps` on as a part of longer work: their fractions 0 to 1 become `low` to `high`."""
+    while True:
+        try:
+            stage, fraction = next(steps)
+        except StopIteration as end:
+            return end.value
+        yield Progress(stage, low + (high - low) * fraction)
+
+
 def drive(steps: Steps[Result], report: Callable[[Progress], None] | None = None) -> Result:
     """Run `steps` to the end, telling `report` of each one, and return its result."""
     while True:

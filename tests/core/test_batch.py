@@ -239,7 +239,9 @@ def test_progress_goes_from_stage_to_stage(run, capsys, tmp_path: Path) -> None:
     assert batch.main(arguments, report=told.append) == 0
     assert told[-1].stage == "Done"
     assert len({step.stage for step in told}) > 4
-    assert all(0 <= step.fraction <= 1 for step in told)
+    fractions = [step.fraction for step in told]
+    assert fractions == sorted(fractions)
+    assert 0 <= fractions[0] <= fractions[-1] <= 1
     assert batch.main(arguments) == 0  # without a reporter of its own: lines on stderr
     assert "Cutting" in capsys.readouterr().err
 
@@ -317,7 +319,11 @@ def test_real_parts_get_good_patterns(name: str, run) -> None:
     [
         ("raspberry_cover.stl", [50, 50, 3.5], "not a closed solid"),
         ("suzanne.obj", [-2.5, 1.2, 5], "not a closed solid"),
+        ("suzanne.obj", None, "not a closed solid"),
     ],
 )
-def test_a_real_part_that_is_no_solid_is_refused(name: str, point: list[float], words: str, run) -> None:
-    check_refusal(run(f"[region]\nnear = {point}\n", DATA / name), words)
+def test_a_real_part_that_is_no_solid_is_refused(
+    name: str, point: list[float] | None, words: str, run
+) -> None:
+    choice = f"near = {point}" if point else "all = true"
+    check_refusal(run(f"[region]\n{choice}\n", DATA / name), words)
