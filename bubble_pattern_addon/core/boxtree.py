@@ -31,7 +31,8 @@ class BoxTree:
 
 def build_tree(corners: Floats) -> BoxTree:
     """Tree over triangles given by their `corners`, (T, 3, 3), T at least 1."""
-    low, high = corners.min(axis=1), corners.max(axis=1)
+    a, b, c = corners.swapaxes(0, 1)
+    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
     order = np.argsort(_morton(low + high), kind="stable")
     # an axis per row: queries look at one axis after the other
     low, high = low[order].T.copy(), high[order].T.copy()

@@ -7,16 +7,22 @@ import numpy as np
 from .mesh import Bools, Floats, Ints, Mesh
 
 
-def same_places(points: Floats, known: Floats) -> Ints:
-    """Row of `known`, (m, 3), at exactly each of `points`, (n, 3); -1 where there is none, (n,).
+def same_places(known: Floats, points: Floats) -> tuple[Ints, Ints]:
+    """Row of `known`, (m, 3), at exactly each of its own places, (m,), and of `points`, (n, 3): (n,), -1
+    where there is none.
 
     Of several known rows at one place always the same one is taken.
     """
     keys = _place_keys(known)
     order = np.argsort(keys, kind="stable")
-    row = order[np.minimum(np.searchsorted(keys[order], _place_keys(points)), len(known) - 1)]
-    there = known[row] == points
-    return np.where(there[:, 0] & there[:, 1] & there[:, 2], row, -1)
+    ranked = keys[order]
+
+    def find(places: Floats, asked: np.ndarray) -> Ints:
+        row = order[np.minimum(np.searchsorted(ranked, asked), len(known) - 1)]
+        there = known[row] == places
+        return np.where(there[:, 0] & there[:, 1] & there[:, 2], row, -1)
+
+    return find(known, keys), find(points, _place_keys(points))
 
 
 def _place_keys(points: Floats) -> np.ndarray:
@@ -30,8 +36,8 @@ def _place_keys(points: Floats) -> np.ndarray:
 
 
 def whole_faces(triangles: Ints, face: Ints, base: Ints) -> tuple[Bools, Ints]:
-    """Which `triangles` of a part, (T', 3), are whole triangles of `base`, (T, 3), and the part's triangles
-    again with the corners of those in the base's order.
+    """Which `triangles` of a part, (T', 3), are whole triangles of `base`, (T, 3), and by how many places
+    those must be turned to have their corners in the base's order, (T',), 0 for the others.
 
     face: (T',) triangle of the base each lies on, below 0 for none. Corners are compared by their index, so
     those of the part must be named like the base's, below 0 for new ones.
@@ -39,12 +45,22 @@ def whole_faces(triangles: Ints, face: Ints, base: Ints) -> tuple[Bools, Ints]:
     pieces = np.bincount(face[face >= 0], minlength=len(base))
     alone = np.flatnonzero(face >= 0)
     alone = alone[pieces[face[alone]] == 1]
-    whole, turned = np.zeros(len(face), dtype=bool), np.zeros(len(face), dtype=np.int64)
-    for turn in range(3):
-        same = np.roll(triangles[alone], -turn, axis=1) == base[face[alone]]
-        match = alone[same[:, 0] & same[:, 1] & same[:, 2]]
-        whole[match], turned[match] = True, turn
-    return whole, (np.arange(3) + turned[:, None]) % 3
+    a, b, c = triangles[alone].T
+    first, second, third = base[face[alone]].T
+    whole, turn = np.zeros(len(face), dtype=bool), np.zeros(len(face), dtype=np.int64)
+    for places, (one, two, three) in enumerate(((a, b, c), (b, c, a), (c, a, b))):
+        match = alone[(one == first) & (two == second) & (three == third)]
+        whole[match], turn[match] = True, places
+    return whole, turn
+
+
+def turned(triangles: Ints, turn: Ints) -> Ints:
+    """`triangles`, (T, 3), each with its corners moved up by `turn` places, (T,)."""
+    moved = triangles.copy()
+    for places in (1, 2):
+        some = np.flatnonzero(turn == places)
+        moved[some] = np.roll(triangles[some], -places, axis=1)
+    return moved
 
 
 def drift(part: Mesh, face: Ints, named: Ints, changed: Ints, base: Mesh) -> float:

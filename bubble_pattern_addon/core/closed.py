@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
+from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
 from .mesh import Floats, Ints, Mesh
@@ -38,12 +38,15 @@ def euler_number(triangles: Ints) -> int:
 
 def shells(mesh: Mesh) -> Ints:
     """Which connected shell each triangle belongs to, (T,), numbered from 0."""
-    a, b, c = mesh.triangles.T
-    links = (np.concatenate([a, a]), np.concatenate([b, c]))
-    graph = coo_array((np.ones(len(links[0]), dtype=np.int8), links), (len(mesh.vertices),) * 2)
-    label = connected_components(graph, directed=False)[1][a]
+    count = len(mesh.triangles)
+    # a graph of triangles and, after them, vertices: in this order its rows are the mesh's own
+    size = count + len(mesh.vertices)
+    starts = np.minimum(3 * np.arange(size + 1), 3 * count).astype(np.int32)
+    corners = (mesh.triangles.ravel() + count).astype(np.int32)
+    graph = csr_array((np.ones(3 * count, dtype=np.int8), corners, starts), shape=(size, size))
+    label = connected_components(graph, directed=False)[1][:count]
     # vertices that no triangle uses are labelled too
-    used = np.zeros(label.max() + 1 if len(label) else 0, dtype=bool)
+    used = np.zeros(label.max() + 1 if count else 0, dtype=bool)
     used[label] = True
     return (np.cumsum(used) - 1)[label]
 

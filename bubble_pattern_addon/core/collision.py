@@ -24,14 +24,14 @@ def colliding(pattern: Pattern, chosen: Ints, top: Floats, bottom: Floats) -> In
     reach = radius[:, None] * np.sqrt(np.clip(1 - axis**2, 0, 1))
     boxes = np.stack([np.minimum(start, end) - reach, np.maximum(start, end) + reach, start], axis=1)
     met = np.zeros(len(chosen), dtype=bool)
-    for pair in close_pairs(build_tree(boxes)):
-        one, other = pair.T
+    for one, other in close_pairs(build_tree(boxes)):
         shortest = _shortest(start[one], end[one], start[other], end[other])
-        apart = np.zeros(len(pair), dtype=bool)
+        apart = np.zeros(len(one), dtype=bool)
         for way in (axis[one], axis[other], shortest):
             span = [_extent(way, start[k], end[k], axis[k], radius[k]) for k in (one, other)]
             apart |= (span[0][1] < span[1][0]) | (span[1][1] < span[0][0])
-        met[pair[~apart]] = True
+        met[one[~apart]] = True
+        met[other[~apart]] = True
     return chosen[met]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -25,32 +26,32 @@ def crossing_triangles(mesh: Mesh, tree: BoxTree) -> Ints:
     """
     size = np.linalg.norm(mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0))
     slack = SHALLOWEST * float(size)
-    plane = mesh.area_vectors
-    length = np.linalg.norm(plane, axis=1)
-    # a face without area has no plane: its heights are 0, so it is never through anything
-    normal = plane / np.where(length > 0, length, 1)[:, None]
+    planes = _planes(mesh)
+    normal = np.ascontiguousarray(planes.normal.T)
     overlapping, stabs = [], []
-    for pair in close_pairs(tree):
+    for one, other in close_pairs(tree):
         # most pairs are neighbours, whose planes clear them: what is cheap and clears many comes first
-        over = _heights(mesh, normal, pair[:, 0], pair[:, 1])
-        left = np.flatnonzero(_straddles(over, slack))
-        under = _heights(mesh, normal, pair[left, 1], pair[left, 0])
-        both = _straddles(under, slack)
-        left, under = left[both], under[both]
+        over = planes.heights(one, other)
+        low, high = over.min(axis=0), over.max(axis=0)
+        left = np.flatnonzero((low < -slack) & (high > slack))
+        under = planes.heights(other[left], one[left])
+        both = (under.min(axis=0) < -slack) & (under.max(axis=0) > slack)
+        left, under = left[both], under[:, both]
+        pair = np.stack([one[left], other[left]], axis=1)
         stabs += [
-            _stabs(mesh, normal, pair[left], under, slack),
-            _stabs(mesh, normal, pair[left, ::-1], over[left], slack),
+            _stabs(mesh, normal, pair, under.T, slack),
+            _stabs(mesh, normal, pair[:, ::-1], over[:, left].T, slack),
         ]
-        flat = np.abs(over) <= slack
-        level = pair[flat[:, 0] & flat[:, 1] & flat[:, 2]]
+        flat = (low >= -slack) & (high <= slack)
+        level = np.stack([one[flat], other[flat]], axis=1)
         overlapping.append(level[_overlaps(mesh, normal, level, slack)])
     if not stabs:
         return np.zeros((0, 2), dtype=np.int64)
     return np.concatenate([*overlapping, _piercing(mesh, np.concatenate(stabs))])
 
 
-def close_pairs(tree: BoxTree) -> Iterator[Ints]:
-    """Blocks of pairs of triangles whose boxes meet, (m, 2), every pair once."""
+def close_pairs(tree: BoxTree) -> Iterator[tuple[Ints, Ints]]:
+    """Blocks of pairs of triangles whose boxes meet, (m,) and (m,), every pair once."""
     root = np.zeros(1, dtype=np.int64)
     waiting = [(len(tree.middle) - 1, root, root)]
     while waiting:
@@ -64,7 +65,7 @@ def close_pairs(tree: BoxTree) -> Iterator[Ints]:
             one, other = one[meet], other[meet]
         if level == 0:
             apart = one != other
-            yield tree.order[np.stack([one[apart], other[apart]], axis=1)]
+            yield tree.order[one[apart]], tree.order[other[apart]]
             continue
         one = np.stack([2 * one, 2 * one, 2 * one + 1, 2 * one + 1], axis=1).ravel()
         other = np.stack([2 * other, 2 * other + 1, 2 * other, 2 * other + 1], axis=1).ravel()
@@ -72,18 +73,36 @@ def close_pairs(tree: BoxTree) -> Iterator[Ints]:
         waiting.append((level - 1, one[there], other[there]))
 
 
-def _straddles(height: Floats, slack: float) -> Bools:
-    """Are some of the three heights, (m, 3), clearly above 0 and some clearly below?"""
-    below, above = height < -slack, height > slack
-    return (below[:, 0] | below[:, 1] | below[:, 2]) & (above[:, 0] | above[:, 1] | above[:, 2])
+@dataclass(frozen=True)
+class _Planes:
+    """Triangles and their planes, a row per coordinate, which is several times faster to pick from.
+
+    corners: (3 coordinates, 3 corners, T); normal: (3, T) unit normals; level: (T,) their planes' heights
+    """
+
+    corners: Floats
+    normal: Floats
+    level: Floats
+
+    def heights(self, plane: Ints, triangle: Ints) -> Floats:
+        """Heights of the corners of `triangle`, (m,), over the planes of `plane`, (m,): (3, m)."""
+        above = -np.broadcast_to(self.level[plane], (3, len(plane)))
+        for corners, normal in zip(self.corners, self.normal, strict=True):
+            along = normal[plane]
+            for row, corner in zip(above, corners, strict=True):
+                row += corner[triangle] * along
+        return above
 
 
-def _heights(mesh: Mesh, normal: Floats, plane: Ints, triangle: Ints) -> Floats:
-    """Heights of the corners of `triangle`, (m,), over the planes of the triangles `plane`, (m,): (m, 3)."""
-    up = normal[plane]
-    level = np.einsum("mk,mk->m", mesh.vertices[mesh.triangles[plane, 0]], up)
-    corners = mesh.vertices[mesh.triangles[triangle]]
-    return np.einsum("mck,mk->mc", corners, up) - level[:, None]
+def _planes(mesh: Mesh) -> _Planes:
+    # from the middle, so that heights are not small differences of large numbers
+    middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
+    corners = np.ascontiguousarray((mesh.vertices - middle).T)[:, np.ascontiguousarray(mesh.triangles.T)]
+    plane = np.ascontiguousarray(mesh.area_vectors.T)
+    length = np.sqrt((plane**2).sum(axis=0))
+    # a face without area has no plane: its heights are 0, so it is never through anything
+    normal = plane / np.where(length > 0, length, 1)
+    return _Planes(corners, normal, (corners[:, 0] * normal).sum(axis=0))
 
 
 def _stabs(mesh: Mesh, normal: Floats, pair: Ints, height: Floats, slack: float) -> Ints:

@@ -8,7 +8,6 @@ import manifold3d
 import numpy as np
 
 from . import carry
-from .boxtree import build_tree
 from .check import Check, check_part
 from .closed import patch_euler
 from .collision import colliding
@@ -105,7 +104,7 @@ def plan_steps(base: Mesh, pattern: Pattern, feature: Feature) -> Steps[Plan]:
     deepest = DEEPEST * pattern.diameter
     if feature.depth is not None:
         deepest = np.maximum(deepest, 2 * feature.depth)
-    wall = near_wall(sound.mesh, build_tree(sound.mesh.corners), pattern, deepest)
+    wall = near_wall(sound.mesh, sound.tree, pattern, deepest)
     fault, bottom = wall.fault.copy(), -wall.bottom
     if feature.depth is not None:
         bottom = np.full(len(pattern), feature.depth)
@@ -173,10 +172,9 @@ def _manifold(mesh: Mesh, facet: Ints, name: int) -> manifold3d.Manifold:
 def _judge(base: Mesh, feature: Feature, plan: Plan, mesh: Mesh, facet: Ints) -> Part:
     """The Part from the boolean's result: where its faces come from, and what can be measured on it."""
     sound, cutters = plan.sound, plan.cutters
-    known = carry.same_places(sound.mesh.vertices, sound.mesh.vertices)
-    named = carry.same_places(mesh.vertices, sound.mesh.vertices)
+    known, named = carry.same_places(sound.mesh.vertices, mesh.vertices)
     whole, turn = carry.whole_faces(named[mesh.triangles], facet, known[sound.mesh.triangles])
-    mesh = Mesh(mesh.vertices, np.take_along_axis(mesh.triangles, turn, axis=1))
+    mesh = Mesh(mesh.vertices, carry.turned(mesh.triangles, turn))
     on_base = facet >= 0
     source = np.empty(len(facet), dtype=np.int64)
     source[on_base] = sound.triangle[facet[on_base]]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .boxtree import build_tree
+from .boxtree import BoxTree, build_tree
 from .closed import edge_keys, fans, is_closed, shells, signed_volumes
 from .crossings import crossing_triangles
 from .errors import BaseError
@@ -23,12 +23,13 @@ class SoundBase:
     """A closed, consistently wound mesh, and where it comes from.
 
     mesh: what the boolean gets; triangle: (T,) the caller's triangle each of its triangles is; vertex: (V,)
-        likewise
+        likewise; tree: of the mesh's triangles
     """
 
     mesh: Mesh
     triangle: Ints
     vertex: Ints
+    tree: BoxTree
 
 
 def sound_base(base: Mesh) -> SoundBase:
@@ -40,35 +41,34 @@ def sound_base(base: Mesh) -> SoundBase:
     """
     _check_numbers(base)
     # bodies that touch along an edge are closed as indexed, and would not be after welding
-    sound = _without_collapsed(base, np.arange(len(base.vertices)))
-    if not is_closed(sound.mesh.triangles):
-        sound = _without_collapsed(base, weld(base.vertices))
-        _check_edges(sound.mesh)
-    sound = _without_pinches(sound)
-    crossing = crossing_triangles(sound.mesh, build_tree(sound.mesh.corners))
+    mesh, triangle, vertex = _without_collapsed(base, np.arange(len(base.vertices)))
+    if not is_closed(mesh.triangles):
+        mesh, triangle, vertex = _without_collapsed(base, weld(base.vertices))
+        _check_edges(mesh)
+    mesh, vertex = _without_pinches(mesh, vertex)
+    tree = build_tree(mesh.corners)
+    crossing = crossing_triangles(mesh, tree)
     if len(crossing):
         faces = np.unique(crossing)
-        place = _where(sound.mesh.corners[crossing[:, 0]].mean(axis=1))
+        place = _where(mesh.corners[crossing[:, 0]].mean(axis=1))
         raise BaseError(
             f"The base passes through itself: {len(faces):,} faces reach through one another, {place}. "
             "Unite the overlapping parts first."
         )
-    _check_orientation(sound.mesh)
-    return sound
+    _check_orientation(mesh)
+    return SoundBase(mesh, triangle, vertex, tree)
 
 
-def _without_pinches(sound: SoundBase) -> SoundBase:
+def _without_pinches(mesh: Mesh, vertex: Ints) -> tuple[Mesh, Ints]:
     """Where the surface touches itself in a vertex, a vertex for each side: handles and bodies count right
     then.
     """
-    fan = fans(sound.mesh.triangles)
-    if fan.max() + 1 == len(sound.mesh.vertices):
-        return sound
-    vertex = np.empty(fan.max() + 1, dtype=np.int64)
-    vertex[fan] = sound.mesh.triangles
-    return SoundBase(
-        Mesh(sound.mesh.vertices[vertex], fan.astype(np.int64)), sound.triangle, sound.vertex[vertex]
-    )
+    fan = fans(mesh.triangles)
+    if fan.max() + 1 == len(mesh.vertices):
+        return mesh, vertex
+    row = np.empty(fan.max() + 1, dtype=np.int64)
+    row[fan] = mesh.triangles
+    return Mesh(mesh.vertices[row], fan.astype(np.int64)), vertex[row]
 
 
 def weld(vertices: Floats) -> Ints:
@@ -84,16 +84,16 @@ def weld(vertices: Floats) -> Ints:
     return target
 
 
-def _without_collapsed(base: Mesh, target: Ints) -> SoundBase:
+def _without_collapsed(base: Mesh, target: Ints) -> tuple[Mesh, Ints, Ints]:
     """`base` with its vertices renamed to `target`, less the faces that collapse and the vertices nobody
-    uses.
+    uses, and which triangles and vertices are left.
     """
     triangles = target[base.triangles]
     a, b, c = triangles.T
     kept = np.flatnonzero((a != b) & (b != c) & (c != a))
     used, index = np.unique(triangles[kept], return_inverse=True)
     mesh = Mesh(base.vertices[used], index.reshape(-1, 3).astype(np.int64))
-    return SoundBase(mesh, kept, used)
+    return mesh, kept, used
 
 
 def _check_numbers(base: Mesh) -> None:
