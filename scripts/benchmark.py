@@ -26,11 +26,10 @@ from scipy.spatial import cKDTree
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from bubble_pattern_addon.core.pipeline import pattern_steps
-
 from bubble_pattern_addon.core.mesh import Floats, Mesh
 from bubble_pattern_addon.core.metric import Constant
 from bubble_pattern_addon.core.pattern import Pattern
+from bubble_pattern_addon.core.pipeline import pattern_steps
 from bubble_pattern_addon.core.progress import drive
 from bubble_pattern_addon.core.quality import Quality, boundary_distance, measure, measure_points
 from bubble_pattern_addon.core.recipe import Feature, Packing, Recipe, Shaping
@@ -111,9 +110,8 @@ def mirrored(position: Floats, pitch: float) -> float:
     return float(cKDTree(position).query(position * [-1, 1, 1])[0].max() / pitch)
 
 
-def our_row(name: str, shape: Shape, pitch: float, seconds: float) -> Row:
+def our_row(name: str, pattern: Pattern, region: Region, pitch: float, seconds: float) -> Row:
     """Measure our packing; the seconds come from elsewhere."""
-    pattern, region, _ = pack(shape, pitch)
     edge = boundary_distance(pattern.position, region.boundary_segments).min() / pitch
     quality = measure(pattern, region)
     mirror = mirrored(pattern.position, pitch) if name in SYMMETRIC else np.nan
@@ -147,12 +145,12 @@ def against(
     pattern, region, _ = pack(shape, pitch)
     runs = [lambda: pack(shape, pitch)[2]]
     if arrange is None:
-        print_rows([our_row(name, shape, pitch, in_turn(runs, repeats)[0])])
+        print_rows([our_row(name, pattern, region, pitch, in_turn(runs, repeats)[0])])
         return len(pattern)
     found = peers.at_count(arrange, pitch, len(pattern))
     runs.append(lambda: arrange(found.spacing).seconds)
     ours, theirs = in_turn(runs, repeats)
-    row = our_row(name, shape, pitch, ours)
+    row = our_row(name, pattern, region, pitch, ours)
     print_rows([replace(row, ratio=ours / theirs), peer_row(name, method, found, region, theirs)])
     return len(pattern)
 
