@@ -165,10 +165,11 @@ def _overlaps(mesh: Mesh, normal: Floats, pair: Ints, slack: float) -> Bools:
     """Do two triangles in one plane, (m, 2), face the same way and share more than a strip `slack` wide?
     (m,)
     """
-    found = np.einsum("mk,mk->m", normal[pair[:, 0]], normal[pair[:, 1]]) > 0
-    one, other = mesh.triangles[pair[:, 0]], mesh.triangles[pair[:, 1]]
+    one, other = mesh.triangles[pair[:, 0]].T, mesh.triangles[pair[:, 1]].T
     # neighbours across an edge cannot overlap while they face the same way
-    found &= (one[:, :, None] == other[:, None]).any(axis=2).sum(axis=1) < 2
+    shared = sum((mine == its).astype(np.int8) for mine in one for its in other)
+    found = np.asarray(shared) < 2
+    found[found] = np.einsum("mk,mk->m", *(normal[side] for side in pair[found].T)) > 0
     some = pair[found]
     apart = np.zeros(len(some), dtype=bool)
     for one, other in (some.T, some[:, ::-1].T):

@@ -31,5 +31,9 @@ class Mesh:
     @property
     def area_vectors(self) -> Floats:
         """Outward normals as long as twice the triangle's area, (T, 3)."""
-        a, b, c = self.corners.swapaxes(0, 1)
-        return np.cross(b - a, c - a)
+        # a column per coordinate: several times faster than rows of three
+        x, y, z = np.ascontiguousarray(self.vertices.T)
+        a, b, c = np.ascontiguousarray(self.triangles.T)
+        ux, uy, uz = (side[b] - side[a] for side in (x, y, z))
+        vx, vy, vz = (side[c] - side[a] for side in (x, y, z))
+        return np.stack([uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx], axis=1)

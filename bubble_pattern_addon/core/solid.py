@@ -157,7 +157,8 @@ def _manifold(mesh: Mesh, facet: Ints, name: int) -> manifold3d.Manifold:
     """
     solid = manifold3d.Manifold(
         manifold3d.Mesh64(
-            vert_properties=np.ascontiguousarray(mesh.vertices),
+            # a copy, because manifold3d takes no array that cannot be written to
+            vert_properties=np.array(mesh.vertices, order="C"),
             tri_verts=np.ascontiguousarray(mesh.triangles, dtype=np.uint64),
             face_id=facet.astype(np.uint64),
             run_index=np.array([0, mesh.triangles.size], dtype=np.uint64),

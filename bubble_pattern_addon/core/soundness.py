@@ -7,6 +7,7 @@ the surface stays closed.
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,13 +33,34 @@ class SoundBase:
     tree: BoxTree
 
 
+_known: dict[bytes, SoundBase] = {}
+"""The base found sound last, by the digest of its arrays: a designer tries many patterns on one part."""
+
+
 def sound_base(base: Mesh) -> SoundBase:
-    """`base` made ready for a boolean.
+    """`base` made ready for a boolean; its arrays cannot be written to.
+
+    The answer for the last base is kept, so that the same mesh is not looked through again.
 
     Raises BaseError, one sentence that says what is wrong, where, and what to do: no faces, coordinates that
     are no numbers, no area, open or non-manifold edges, inconsistent winding, inside out, one body inside
     another, faces that reach through one another.
     """
+    digest = hashlib.blake2b(np.ascontiguousarray(base.vertices))
+    digest.update(np.ascontiguousarray(base.triangles))
+    digest.update(repr([(side.shape, side.dtype) for side in (base.vertices, base.triangles)]).encode())
+    key = digest.digest()
+    if key not in _known:
+        sound = _examined(base)
+        for array in (sound.mesh.vertices, sound.mesh.triangles, sound.triangle, sound.vertex):
+            array.flags.writeable = False
+        _known.clear()
+        _known[key] = sound
+    return _known[key]
+
+
+def _examined(base: Mesh) -> SoundBase:
+    """`sound_base` of a base not seen before."""
     _check_numbers(base)
     # bodies that touch along an edge are closed as indexed, and would not be after welding
     mesh, triangle, vertex = _without_collapsed(base, np.arange(len(base.vertices)))
@@ -165,12 +187,18 @@ def _check_orientation(mesh: Mesh) -> None:
 
 def _probes(mesh: Mesh, shell: Ints) -> Floats:
     """Corners of each shell that lie farthest out along x, y and z, both ways, (shells, 6, 3)."""
-    owner, corners = np.repeat(shell, 3), mesh.corners.reshape(-1, 3)
+    owner = np.zeros(len(mesh.vertices), dtype=np.int64)
+    owner[mesh.triangles] = shell[:, None]
     probes = []
-    for axis in range(3):
-        order = np.lexsort((corners[:, axis], owner))
-        bounds = np.searchsorted(owner[order], np.arange(shell.max() + 2))
-        probes += [corners[order[bounds[:-1]]], corners[order[bounds[1:] - 1]]]
+    for height in np.ascontiguousarray(mesh.vertices.T):
+        for way in (-height, height):
+            farthest = np.full(shell.max() + 1, -np.inf)
+            np.maximum.at(farthest, owner, way)
+            found = np.flatnonzero(way == farthest[owner])[::-1]
+            # of several the first, which is written last
+            probe = np.empty(len(farthest), dtype=np.int64)
+            probe[owner[found]] = found
+            probes.append(mesh.vertices[probe])
     return np.stack(probes, axis=1)
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from bubble_pattern_addon.core import soundness
 from bubble_pattern_addon.core.errors import BaseError
 from bubble_pattern_addon.core.mesh import Mesh
 from bubble_pattern_addon.core.soundness import sound_base, weld
@@ -169,3 +170,22 @@ def test_a_surface_that_passes_through_itself():
 def test_a_surface_pinched_in_a_point_has_a_vertex_for_each_side():
     pinched = soup(together(CUBE, shifted(CUBE, 2, 2, 2)))
     assert len(sound_base(pinched).mesh.vertices) == 16
+
+
+def test_a_base_is_examined_once_and_again_after_any_change(monkeypatch):
+    looked = []
+    examined = soundness._examined
+    monkeypatch.setattr(soundness, "_known", {})
+    monkeypatch.setattr(soundness, "_examined", lambda base: looked.append(0) or examined(base))
+    base = box((0, 0, 0), (1, 1, 1))
+    first = sound_base(base)
+    assert sound_base(Mesh(base.vertices.copy(), base.triangles.copy())) is first
+    assert len(looked) == 1
+    with pytest.raises(ValueError, match="read-only"):
+        first.mesh.vertices[0] = 5
+    base.vertices[0, 0] -= 1e-12
+    assert sound_base(base).mesh.vertices[0, 0] == base.vertices[0, 0]
+    for _ in range(2):
+        with pytest.raises(BaseError):
+            sound_base(Mesh(base.vertices, base.triangles[1:]))
+    assert len(looked) == 4
