@@ -17,7 +17,7 @@ REACH = 1.5
 # How many times stiffer than the law's own the contact is in the last phase.
 STIFFNESS = 12.0
 # The last phase pushes pairs apart that are closer than this share of their stable distance.
-EVEN = 0.98
+EVEN = 0.985
 # No bubble feels more others than this: on a crowded spot a dozen have room within 1.66 pitches.
 MOST_NEAR = 20
 

@@ -26,19 +26,20 @@ SIX = np.exp(1j * np.pi / 3 * np.arange(6))
 # Proposals closer together than this share of the pitch mean the same place; bubbles are born no closer than
 # CROWDED.
 SAME = 0.5
-CROWDED = 0.72
+CROWDED = 0.78
 # Bubbles of so many generations are searched anew for each generation; older ones only when they have become
 # many.
 RECENT = 4
 
 
 def grow(
-    charts: Charts, pitch: Lengths, seeds: Spots, directions: Complex, most: int
+    charts: Charts, pitch: Lengths, seeds: Spots, directions: Complex, most: int, field: Complex | None = None
 ) -> tuple[Spots, Complex]:
     """Lattice grown from `seeds` with a row along each seed's direction, until the region is full.
 
     Returns the bubbles' places and row directions (unit, in their triangles' frames), seeds first, generation
-    after generation. Ends early when there are more than `most`.
+    after generation. Ends early when there are more than `most`. With a `field` of sixth powers of directions
+    in the triangles' frames, (R,), the rows follow it wherever it is not 0.
     """
     crowd = _Crowd(charts, float(pitch(seeds).max()))
     spots, heading = seeds, directions
@@ -49,6 +50,8 @@ def grow(
     while len(front.row) and total <= most:
         proposals, turned = _proposals(charts, pitch, crowd, front, front_heading)
         front, front_heading = _agreed(charts, pitch, crowd, proposals, turned)
+        if field is not None:
+            front_heading = _following(front_heading, field[front.row])
         crowd.add(front)
         generations.append((front, front_heading))
         total += len(front.row)
@@ -57,6 +60,11 @@ def grow(
     )
     heading = np.concatenate([heading for _, heading in generations])
     return spots, heading
+
+
+def _following(heading: Complex, six: Complex) -> Complex:
+    """The headings turned, by less than a twelfth, to where the sixth power is `six`; left where it is 0."""
+    return heading * np.exp(1j * np.where(six != 0, np.angle(six / heading**6), 0.0) / 6)
 
 
 class _Crowd:

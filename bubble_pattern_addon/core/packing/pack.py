@@ -14,11 +14,22 @@ from ..region import Region
 from ..surface import Charts, Complex, Spots, make_charts, positions, to_frame, walk
 from .bubbles import Bubbles, Ground, all_spots
 from .crowding import close_pairs, uncrowded
+from .direction import smooth_directions
 from .force import STIFFNESS, stiff_law
 from .lattice import grow
 from .population import control
 from .relax import relax
-from .rim import FirstRow, Lengths, Track, first_row, inset_track, on_track, spots_on_track, straight_stretches
+from .rim import (
+    FirstRow,
+    Lengths,
+    Track,
+    first_row,
+    inset_track,
+    on_track,
+    spots_on_track,
+    straight_stretches,
+)
+from .rk4 import integrate
 
 # A recipe that asks for more bubbles than this is taken for a slip of the pen.
 MOST = 1_000_000
@@ -46,21 +57,20 @@ def pack_steps(region: Region, packing: Packing) -> Steps[tuple[Ground, Bubbles]
     bubbles = Bubbles(row, free)
     if not len(bubbles):
         raise RegionError(
-            "No bubble fits into the target region: it is narrower than one pitch everywhere; use a smaller pitch or a "
-            "larger region."
+            "No bubble fits into the target region: it is narrower than one pitch everywhere; use a smaller "
+            "pitch or a larger region."
         )
     for number in range(ROUNDS):
         yield Progress("Packing the bubbles", 0.2 + 0.2 * number)
         local = local_pitch(ground, bubbles)
-        bubbles, _ = relax(ground, bubbles, local, packing.iterations, packing.tolerance)
+        settle = relax if packing.integrator == "fire" else integrate
+        bubbles, _ = settle(ground, bubbles, local, packing.iterations, packing.tolerance)
         bubbles, changed = control(ground, bubbles, local)
         if not changed:
             break
     yield Progress("Evening out the gaps", 0.8)
     local = local_pitch(ground, bubbles)
-    bubbles, _ = relax(
-        ground, bubbles, local, STIFF_STEPS, packing.tolerance, stiff_law, 1.0 + STIFFNESS
-    )
+    bubbles, _ = relax(ground, bubbles, local, STIFF_STEPS, packing.tolerance, stiff_law, 1.0 + STIFFNESS)
     return ground, bubbles
 
 
@@ -88,8 +98,8 @@ def _check_count(region: Region, pitch: Lengths) -> None:
     if count > MOST:
         fitting = float(local.mean()) * np.sqrt(count / MOST)
         raise RegionError(
-            f"A pitch of {local.mean():.4g} means about {count:,.0f} features in this region, more than {MOST:,}: "
-            f"use a pitch of at least {fitting:.3g}, or a smaller region."
+            f"A pitch of {local.mean():.4g} means about {count:,.0f} features in this region, more than "
+            f"{MOST:,}: use a pitch of at least {fitting:.3g}, or a smaller region."
         )
 
 
@@ -98,7 +108,9 @@ def _ground(charts: Charts, pitch: Lengths, edge_offset: float) -> Ground:
     if not len(rim):
         nothing = np.empty(0)
         empty = Spots(nothing.astype(np.int64), np.empty((0, 3)))
-        track = Track(empty, np.empty((0, 3)), nothing, empty.row, empty.row.astype(bool), nothing.astype(bool))
+        track = Track(
+            empty, np.empty((0, 3)), nothing, empty.row, empty.row.astype(bool), nothing.astype(bool)
+        )
         return Ground(charts, None, track, pitch, edge_offset)
     finest = float(pitch(Spots(rim[:, 0], np.full((len(rim), 3), 1 / 3))).min())
     boundary = make_boundary(charts.region, finest / 8)
@@ -111,7 +123,7 @@ def _where(charts: Charts, spots: Spots, reach: float) -> Floats:
 
 
 def _without_conflicts(ground: Ground, row: FirstRow) -> FirstRow:
-    """The first row less those who stand too close, as across a neck or in an acute corner; corners go last."""
+    """The first row less those too close, as across a neck or in an acute corner; corners go last."""
     if not len(row.arc):
         return row
     spots = spots_on_track(ground.charts, ground.track, row.wrapped())
@@ -126,7 +138,11 @@ def _lattice(ground: Ground, row: FirstRow, seed: int) -> Spots:
     """Bubbles of a lattice that fills what the first row leaves free."""
     charts = ground.charts
     seeds, directions = _seeds(ground, seed)
-    spots, _ = grow(charts, ground.pitch, seeds, directions, MOST)
+    closed = np.bincount(charts.region.sheet[charts.region.rim[:, 0]], minlength=len(seeds.row)) == 0
+    field = smooth_directions(charts, closed[charts.region.sheet]) if closed.any() else None
+    if field is not None:
+        directions = np.where(closed, field[seeds.row] ** (1 / 6), directions)
+    spots, _ = grow(charts, ground.pitch, seeds, directions, MOST, field)
     if ground.boundary is None:
         return spots
     local = ground.pitch(spots)
@@ -137,8 +153,8 @@ def _lattice(ground: Ground, row: FirstRow, seed: int) -> Spots:
 def _seeds(ground: Ground, seed: int) -> tuple[Spots, Complex]:
     """One start of the lattice for each connected part of the region, and the direction of its rows.
 
-    A part with a straight edge starts there, so that lattice and first row are one; any other starts in its middle.
-    A `seed` other than 0 turns the middle ones and shifts all of them by chance, for another pattern of the same recipe.
+    A part with a straight edge starts there, so that lattice and first row are one; any other in its middle.
+    A `seed` other than 0 turns and shifts them by chance, for another pattern of the same recipe.
     """
     charts, track = ground.charts, ground.track
     seeds = _middles(charts.region)
@@ -168,7 +184,10 @@ def _middles(region: Region) -> Spots:
     middle = region.corners.mean(axis=1)
     sheets = int(region.sheet.max()) + 1
     weight = np.bincount(region.sheet, area, sheets)
-    centre = np.stack([np.bincount(region.sheet, area * axis, sheets) for axis in middle.T], axis=1) / weight[:, None]
+    centre = (
+        np.stack([np.bincount(region.sheet, area * axis, sheets) for axis in middle.T], axis=1)
+        / weight[:, None]
+    )
     away = np.linalg.norm(middle - centre[region.sheet], axis=1)
     order = np.lexsort((away, region.sheet))
     first = order[np.searchsorted(region.sheet[order], np.arange(sheets))]

@@ -8,7 +8,7 @@ and their neighbours, are worked on.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -41,7 +41,7 @@ class Work:
 
 
 @dataclass
-class _Swarm:
+class Swarm:
     """The bubbles as arrays that the relaxation writes to, the first row (m of them) first.
 
     points, row: (n, 3), (n,); bary: (n, 3), of the free ones; arc: (m,); tangent: (m, 3); velocity: (n, 3)
@@ -78,7 +78,7 @@ def relax(
     pitch: (n,) the bubbles' local pitch, held for the time of the relaxation; stiffness: of the law's
     contact, relative to the paper's. Bubbles for which `moving` (n,) is false stay where they are.
     """
-    swarm = _swarm(ground, bubbles, pitch)
+    swarm = swarm_of(ground, bubbles, pitch)
     pace, mixing, downhill = 0.5 * QUICKEST / np.sqrt(stiffness), 0.1, 0
     quickest = QUICKEST / np.sqrt(stiffness)
     # A bubble at rest that feels less than this would move by less than the tolerance in its first step.
@@ -87,7 +87,7 @@ def relax(
     everyone = np.ones(len(pitch), dtype=bool) if moving is None else moving
     active = everyone
     while done < iterations:
-        pull = _pull(swarm, _links(swarm, np.flatnonzero(active)), law)
+        pull = pull_on(swarm, links_of(swarm, np.flatnonzero(active)), law)
         stirred = active.copy()
         stirred[active] = np.einsum("nc,nc->n", pull, pull) > quiet**2
         stirred &= everyone
@@ -105,14 +105,25 @@ def relax(
         done += block
         if done % (3 * BLOCK) == 0:
             active = everyone
-    row = with_arc(bubbles.first_row, swarm.arc)
+    return bubbles_of(swarm), swarm.work
+
+
+def twin(swarm: Swarm) -> Swarm:
+    """The same bubbles once more, to be moved on trial; the list of pairs is shared."""
+    places = ("points", "row", "tangent", "bary", "arc")
+    return replace(swarm, **{name: getattr(swarm, name).copy() for name in places})
+
+
+def bubbles_of(swarm: Swarm) -> Bubbles:
+    """The bubbles where the swarm has them."""
     m = len(swarm.arc)
-    return Bubbles(row, Spots(swarm.row[m:], swarm.bary)), swarm.work
+    return Bubbles(with_arc(swarm.bubbles.first_row, swarm.arc), Spots(swarm.row[m:], swarm.bary))
 
 
-def _swarm(ground: Ground, bubbles: Bubbles, pitch: Floats) -> _Swarm:
+def swarm_of(ground: Ground, bubbles: Bubbles, pitch: Floats) -> Swarm:
+    """The bubbles as arrays, at rest, with their pairs listed."""
     points, row, tangent = points_and_rows(ground, bubbles)
-    return _Swarm(
+    return Swarm(
         ground,
         bubbles,
         pitch,
@@ -128,7 +139,7 @@ def _swarm(ground: Ground, bubbles: Bubbles, pitch: Floats) -> _Swarm:
 
 
 @dataclass(frozen=True)
-class _Links:
+class Links:
     """The pairs that act on the bubbles `active` (a,), and the (a, p) matrix that adds up their forces."""
 
     active: Ints
@@ -136,7 +147,8 @@ class _Links:
     incidence: csr_array
 
 
-def _links(swarm: _Swarm, active: Ints) -> _Links:
+def links_of(swarm: Swarm, active: Ints) -> Links:
+    """The pairs that act on the bubbles `active` (a,)."""
     n = len(swarm.points)
     pairs = swarm.pairs
     place = np.full(n, -1)
@@ -154,10 +166,10 @@ def _links(swarm: _Swarm, active: Ints) -> _Links:
         ),
         shape=(len(active), len(first)),
     )
-    return _Links(active, pairs, incidence)
+    return Links(active, pairs, incidence)
 
 
-def _pull(swarm: _Swarm, links: _Links, law: Law) -> Floats:
+def pull_on(swarm: Swarm, links: Links, law: Law) -> Floats:
     """Accelerations (a, 3) of the active bubbles along the surface, in units of the local pitch.
 
     The contact stiffness is k0/l0^2; with masses of 1/pitch^2 bubbles of all sizes swing at the same pace,
@@ -182,7 +194,7 @@ def _pull(swarm: _Swarm, links: _Links, law: Law) -> Floats:
     return pull
 
 
-def _with_neighbours(swarm: _Swarm, stirred: Bools, pull: Floats, quiet: float) -> Bools:
+def _with_neighbours(swarm: Swarm, stirred: Bools, pull: Floats, quiet: float) -> Bools:
     """The stirred bubbles and those that their motion will reach within a block of steps."""
     reached = stirred.copy()
     for _ in range(2):
@@ -194,7 +206,7 @@ def _with_neighbours(swarm: _Swarm, stirred: Bools, pull: Floats, quiet: float) 
 
 
 def _block(
-    swarm: _Swarm,
+    swarm: Swarm,
     active: Ints,
     law: Law,
     steps: int,
@@ -204,9 +216,9 @@ def _block(
     quickest: float,
 ) -> tuple[float, float, int]:
     """Some steps of FIRE on the active bubbles; returns its time step, mixing and count of steps downhill."""
-    links = _links(swarm, active)
+    links = links_of(swarm, active)
     for _ in range(steps):
-        pull = _pull(swarm, links, law)
+        pull = pull_on(swarm, links, law)
         velocity = swarm.velocity[active] + pace * pull
         if _dot(pull, velocity) > 0:
             size = np.sqrt(_dot(velocity, velocity) / _dot(pull, pull))
@@ -222,9 +234,9 @@ def _block(
         if longest > LONGEST_STEP:
             step *= LONGEST_STEP / longest
         swarm.velocity[active] = velocity
-        _move(swarm, active, step * swarm.pitch[active, None])
-        if _list_anew(swarm, active):
-            links = _links(swarm, active)
+        move(swarm, active, step * swarm.pitch[active, None])
+        if list_anew(swarm, active):
+            links = links_of(swarm, active)
     return pace, mixing, downhill
 
 
@@ -235,7 +247,7 @@ def _dot(a: Floats, b: Floats) -> float:
     return float(np.einsum("nc,nc->", a, b))
 
 
-def _list_anew(swarm: _Swarm, active: Ints) -> bool:
+def list_anew(swarm: Swarm, active: Ints) -> bool:
     """Find the pairs of those bubbles anew that have moved by half the skin since they were listed; whether
     any had.
     """
@@ -255,7 +267,7 @@ def _list_anew(swarm: _Swarm, active: Ints) -> bool:
     return True
 
 
-def _move(swarm: _Swarm, active: Ints, steps: Floats) -> None:
+def move(swarm: Swarm, active: Ints, steps: Floats) -> None:
     """Move the active bubbles by `steps` (a, 3): the first row slides along its track, the others walk on the
     surface.
     """
