@@ -24,6 +24,7 @@ from ..core.pattern import Pattern
 from ..core.quality import measure
 from .attributes import CORNER_VERTEX, MATERIAL, write_values
 from .generation import fill_settings, measured, place_part, put, read_source, verdict_of
+from .marked_side import on_marked_side
 from .part_mesh import build_part_mesh
 from .pattern_object import new_pattern_object
 from .picture import render_part
@@ -31,7 +32,7 @@ from .properties import is_pattern, recipe_of
 from .provenance import Original, read_original
 from .reading import Base, evaluated_mesh, transformed
 from .reading import read_base as read_object
-from .target_region import ATTRIBUTE, on_marked_side, store
+from .target_region import ATTRIBUTE, store
 
 if TYPE_CHECKING:
     from ..batch import Run

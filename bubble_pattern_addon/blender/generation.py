@@ -27,6 +27,7 @@ from ..core.recipe import Recipe, RegionChoice, default_recipe
 from ..core.region import Region, make_region
 from ..core.selection import select
 from ..core.solid import Part, part_steps
+from .marked_side import on_marked_side
 from .part_mesh import build_part_mesh
 from .pattern_object import read_pattern, write_diameters, write_pattern
 from .preview_nodes import show_preview
@@ -42,7 +43,6 @@ from .properties import (
 )
 from .provenance import Original, read_original
 from .reading import Base, evaluated_mesh, read_base
-from .target_region import on_marked_side
 
 # A pattern that took longer than this is not laid anew at every change of a setting.
 LIVE_SECONDS = 1.0
@@ -301,7 +301,10 @@ def place_part(
 
 
 def show_part(obj: bpy.types.Object, context: bpy.types.Context, applied: bool) -> None:
-    """Show the part and hide the base with its patterns, or the other way round, and select what is shown."""
+    """Show the part and hide the base with its patterns, or the other way round, and select what is shown.
+
+    The base is selected rather than the pattern, whose every feature would be outlined.
+    """
     settings = obj.bubble_pattern
     for other in [settings.base, *pattern_objects(settings.base)]:
         other.hide_set(applied)
@@ -310,7 +313,8 @@ def show_part(obj: bpy.types.Object, context: bpy.types.Context, applied: bool) 
     if in_scene(part):
         part.hide_set(not applied)
         part.hide_render = not applied
-    make_active(part if applied else obj, context)
+    settings.base.bubble_pattern.pattern = obj
+    make_active(part if applied else settings.base, context)
 
 
 def make_active(obj: bpy.types.Object, context: bpy.types.Context) -> None:

@@ -103,7 +103,7 @@ class BUBBLE_PATTERN_OT_add(SteppedOperator, bpy.types.Operator):
             if editing:
                 bpy.ops.object.mode_set(mode='EDIT')
             raise
-        generation.make_active(obj, context)
+        generation.show_part(obj, context, False)
         return obj
 
     def done(self, context: bpy.types.Context, result: bpy.types.Object) -> None:
@@ -262,7 +262,7 @@ class BUBBLE_PATTERN_OT_region_assign(SteppedOperator, bpy.types.Operator):
             store(base, name, before)
             bpy.ops.object.mode_set(mode='EDIT')
             raise
-        generation.make_active(obj, context)
+        generation.show_part(obj, context, False)
         return obj
 
     def done(self, context: bpy.types.Context, result: bpy.types.Object) -> None:

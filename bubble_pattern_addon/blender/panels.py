@@ -6,7 +6,7 @@ from typing import Any
 
 import bpy
 
-from .properties import in_scene, is_outdated, is_pattern, pattern_of
+from .properties import in_scene, is_outdated, is_pattern, pattern_objects, pattern_of
 
 
 class SidebarPanel:
@@ -108,20 +108,25 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
     ) -> None:
         """The pattern as it stands; its settings are in the panels below."""
         settings = obj.bubble_pattern
-        layout.label(text=settings.base.name, icon='OBJECT_DATA')
+        base = settings.base
+        if context.active_object == base and len(pattern_objects(base)) > 1:
+            layout.prop(base.bubble_pattern, "pattern", text="")
+        else:
+            layout.label(text=obj.name, icon='MOD_PARTICLE_INSTANCE')
+        outdated = bool(settings.trouble) or is_outdated(settings)
+        row = layout.row(align=True)
         if context.mode == 'EDIT_MESH':
-            row = layout.row(align=True)
             row.operator("bubble_pattern.region_assign", text="Assign Region", icon='CHECKMARK')
             if not is_pattern(context.active_object):
                 row.operator("bubble_pattern.add", text="", icon='ADD')
         else:
-            layout.operator("bubble_pattern.region_edit", icon='FACESEL')
+            row.operator("bubble_pattern.region_edit", icon='FACESEL')
+            if not outdated:
+                row.operator("bubble_pattern.update", icon='FILE_REFRESH')
         if settings.trouble:
             sentences(layout, settings.trouble, context.region.width, 'ERROR')
-        outdated = bool(settings.trouble) or is_outdated(settings)
-        (large(layout) if outdated else layout.row()).operator(
-            "bubble_pattern.update", text="Update", icon='FILE_REFRESH', depress=outdated
-        )
+        if outdated:
+            large(layout).operator("bubble_pattern.update", icon='FILE_REFRESH', depress=True)
         (layout.row() if outdated else large(layout)).operator("bubble_pattern.apply", icon='CHECKMARK')
         layout.operator("bubble_pattern.remove", icon='TRASH')
 

@@ -55,6 +55,11 @@ def redraw_preview(settings: bpy.types.PropertyGroup, _context: bpy.types.Contex
         show_preview(settings.id_data, settings.show_bubbles)
 
 
+def is_on(settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
+    """Whether `obj` is a pattern on the object that has these settings."""
+    return obj.bubble_pattern.base == settings.id_data and in_scene(obj)
+
+
 def is_mesh(_settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
     """Whether `obj` can be a base."""
     return obj.type == 'MESH'
@@ -74,7 +79,10 @@ class BubblePatternSettings(bpy.types.PropertyGroup):
         name="Part", description="Finished part made of this pattern", type=bpy.types.Object
     )
     pattern: PointerProperty(
-        name="Pattern", description="Pattern this part was made of", type=bpy.types.Object
+        name="Pattern",
+        description="Pattern on this base that the sidebar shows; for a part, the one it was made of",
+        type=bpy.types.Object,
+        poll=is_on,
     )
     region: StringProperty(
         name="Region",
@@ -311,11 +319,12 @@ def pattern_objects(base: bpy.types.Object) -> list[bpy.types.Object]:
 
 
 def pattern_of(obj: bpy.types.Object | None) -> bpy.types.Object | None:
-    """The pattern that `obj` is, or carries, or was made of."""
+    """The pattern that `obj` is, or carries (of several the one it names), or was made of."""
     if obj is None or is_pattern(obj):
         return obj
-    if in_scene(obj.bubble_pattern.pattern):
-        return obj.bubble_pattern.pattern
+    named = obj.bubble_pattern.pattern
+    if in_scene(named) and obj in (named.bubble_pattern.base, named.bubble_pattern.part):
+        return named
     on_base = pattern_objects(obj)
     return on_base[0] if on_base else None
 

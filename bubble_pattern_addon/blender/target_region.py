@@ -6,16 +6,10 @@ import bpy
 import numpy as np
 
 from ..core.errors import RegionError
-from ..core.mesh import Bools, Mesh
-from ..core.sides import faced_side
 from .attributes import Array, read_values, write_values
 from .properties import pattern_objects
-from .reading import Base, read_base
 
 ATTRIBUTE = "bubble_region"
-
-# Modifiers that make a second side of a surface, and copy the marks on its faces there.
-THICKENING = {'SOLIDIFY', 'NODES'}
 
 
 def free_name(base: bpy.types.Object) -> str:
@@ -63,16 +57,3 @@ def wanted_faces(base: bpy.types.Object, name: str, only_selected: bool) -> Arra
     if marked is not None and marked.any():
         return marked
     return np.ones(len(base.data.polygons), dtype=bool)
-
-
-def on_marked_side(obj: bpy.types.Object, base: Base, name: str, selected: Bools) -> Bools:
-    """The triangles `selected` (T,) of `base`, those of the attribute `name`, less the copies that a Solidify
-    modifier has put on the other side of the wall it made.
-    """
-    if not any(m.type in THICKENING and m.show_viewport for m in obj.modifiers):
-        return selected
-    own = read_base(obj, obj.data, base.frame)
-    marked = own.attributes.get(name)
-    if marked is None:
-        return selected
-    return faced_side(base.mesh, selected, Mesh(own.mesh.vertices, own.mesh.triangles[marked]))

@@ -10,6 +10,8 @@ import numpy as np
 from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 
+from bubble_pattern_addon.blender.properties import pattern_of
+
 
 def plate(size: float = 0.1, thickness: float = 0.01, name: str = "Plate") -> bpy.types.Object:
     """A flat plate of six quads, its top at z = thickness / 2."""
@@ -93,7 +95,8 @@ def add_on_top(obj: bpy.types.Object) -> bpy.types.Object:
     """A pattern on the faces of `obj` that look up, added from Edit Mode."""
     select_faces(obj, on_top)
     assert bpy.ops.bubble_pattern.add() == {'FINISHED'}
-    return bpy.context.object
+    assert bpy.context.object == obj
+    return pattern_of(obj)
 
 
 def points(pattern: bpy.types.Object, name: str = "position") -> np.ndarray:

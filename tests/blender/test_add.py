@@ -63,9 +63,9 @@ def test_defaults_leave_room_for_rows_in_a_strip() -> None:
 def test_object_mode_takes_all_faces() -> None:
     base = plate()
     assert bpy.ops.bubble_pattern.add() == {'FINISHED'}
-    normals = points(bpy.context.object, "normal")
+    normals = points(pattern_of(bpy.context.object), "normal")
     assert len(np.unique(normals.round(3), axis=0)) >= 6
-    assert off_surface(bpy.context.object, base)[0] < 1e-6
+    assert off_surface(pattern_of(bpy.context.object), base)[0] < 1e-6
 
 
 def test_object_mode_takes_the_marked_faces() -> None:
@@ -73,7 +73,7 @@ def test_object_mode_takes_the_marked_faces() -> None:
     marked = base.data.attributes.new("bubble_region", 'BOOLEAN', 'FACE')
     marked.data.foreach_set("value", [face.normal.x > 0.7 for face in base.data.polygons])
     bpy.ops.bubble_pattern.add()
-    assert np.allclose(points(bpy.context.object, "normal"), [1, 0, 0])
+    assert np.allclose(points(pattern_of(bpy.context.object), "normal"), [1, 0, 0])
 
 
 @pytest.mark.parametrize(
@@ -181,11 +181,25 @@ def test_a_second_pattern_has_a_region_of_its_own() -> None:
     first = add_on_top(base)
     select_faces(base, lambda face: face.normal.z < -0.7)
     bpy.ops.bubble_pattern.add()
-    second = bpy.context.object
+    second = pattern_of(bpy.context.object)
     assert second != first
     assert second.bubble_pattern.region != first.bubble_pattern.region
     assert np.allclose(points(first)[:, 2], 0.005)
     assert np.allclose(points(second)[:, 2], -0.005)
+
+
+def test_the_sidebar_shows_the_newest_pattern_or_the_one_chosen() -> None:
+    base = plate()
+    first = add_on_top(base)
+    select_faces(base, lambda face: face.normal.z < -0.7)
+    bpy.ops.bubble_pattern.add()
+    second = pattern_of(base)
+    assert second not in {first, None}
+    base.bubble_pattern.pattern = first
+    assert pattern_of(base) == first
+    copy = base.copy()
+    bpy.context.collection.objects.link(copy)
+    assert pattern_of(copy) is None
 
 
 def test_a_refused_base_stays_as_it_was() -> None:

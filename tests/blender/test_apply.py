@@ -10,6 +10,8 @@ bpy = pytest.importorskip("bpy", reason="needs the bpy module: python scripts/te
 import bmesh  # noqa: E402
 from mathutils import Euler, Matrix  # noqa: E402
 
+from bubble_pattern_addon.blender.properties import pattern_of  # noqa: E402
+
 from .parts import (  # noqa: E402
     activate,
     add_on_top,
@@ -273,6 +275,7 @@ def test_a_changed_base_is_laid_anew_before_it_is_cut() -> None:
 def test_features_deleted_by_hand_stay_away() -> None:
     base = plate()
     pattern = add_on_top(base)
+    activate(pattern)
     bpy.ops.object.mode_set(mode='EDIT')
     bpy.ops.mesh.select_all(action='DESELECT')
     bpy.ops.object.mode_set(mode='OBJECT')
@@ -290,7 +293,7 @@ def test_two_patterns_make_one_part() -> None:
     first = add_on_top(base)
     select_faces(base, lambda face: face.normal.x > 0.7)
     bpy.ops.bubble_pattern.add()
-    second = bpy.context.object
+    second = pattern_of(bpy.context.object)
     for pattern in (first, second):
         pattern.bubble_pattern.depth_mode = 'BLIND'
         pattern.bubble_pattern.depth = 0.0005

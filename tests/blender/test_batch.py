@@ -16,7 +16,7 @@ from bubble_pattern_addon.blender import batch_base, command, properties  # noqa
 from bubble_pattern_addon.core.files import write_mesh  # noqa: E402
 from bubble_pattern_addon.core.mesh import Mesh  # noqa: E402
 
-from .parts import euler, is_closed, panel, plate, points  # noqa: E402
+from .parts import euler, is_closed, panel, plate, points, sheet  # noqa: E402
 
 RECIPE = """
 [region]
@@ -94,6 +94,22 @@ def test_modifiers_are_part_of_the_base(tmp_path: Path) -> None:
     pattern = opened(out)
     assert np.allclose(points(pattern)[:, 2], 0.005, atol=1e-6)
     check_editable(pattern, json.loads((out / "report.json").read_text())["features"])
+
+
+def test_the_inner_side_of_a_solidified_base_is_left_out(tmp_path: Path) -> None:
+    base = sheet()
+    base.modifiers.new("Wall", 'SOLIDIFY').thickness = 0.003
+    marked = base.data.attributes.new("Grille", 'BOOLEAN', 'FACE')
+    marked.data.foreach_set("value", [face.center.length < 0.06 for face in base.data.polygons])
+    path = saved(tmp_path)
+    out = tmp_path / "out"
+    arguments = [recipe(tmp_path, 'attribute = "Grille"'), "--base", path, "--out", str(out), "--quiet"]
+    assert batch.main(arguments) == 0
+    report = json.loads((out / "report.json").read_text())
+    assert report["genus"] == report["features"]
+    pattern = opened(out)
+    assert (points(pattern, "normal")[:, 2] > 0.5).all()
+    check_editable(pattern, report["features"])
 
 
 def test_the_open_file_is_the_base_of_the_command(tmp_path: Path) -> None:

@@ -28,7 +28,10 @@ PYTHON_TAG = f"cp{sys.version_info.major}{sys.version_info.minor}"
 # Run in a Blender that has never seen this repository: only what the zip holds may be needed.
 ENABLE = """
 import json, sys
-import bpy, addon_utils
+from pathlib import Path
+import bpy, addon_utils, numpy
+beside = str(Path(numpy.__file__).parents[1])
+sys.path[:] = [place for place in sys.path if place != beside]  # not what lies beside the module
 addon_utils.extensions_refresh(ensure_wheels=True)
 name = "bl_ext.user_default.bubble_pattern"
 assert addon_utils.enable(name, default_set=True) is not None, "not enabled"
@@ -36,6 +39,8 @@ warnings = addon_utils._extensions_warnings_get()
 bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
 bpy.ops.mesh.primitive_cube_add(size=0.1)
 cube = bpy.context.object.data
+for vertex in cube.vertices:
+    vertex.co.z *= 0.05
 marked = cube.attributes.new("bubble_region", 'BOOLEAN', 'FACE')
 marked.data.foreach_set("value", [face.normal.z > 0.7 for face in cube.polygons])
 bpy.ops.bubble_pattern.add()
@@ -105,7 +110,7 @@ def test_the_installed_zip_works_without_warnings(zip_file: Path, tmp_path: Path
     assert found["holes"] > 100
     assert found["faces"] > 6 * found["holes"]
     assert found["left"] == []
-    assert all(str(extensions) in place for place in found["places"])
+    assert [place for place in found["places"] if str(extensions) not in place] == []
 
 
 def test_wheels_are_those_a_blender_may_have() -> None:

@@ -10,7 +10,7 @@ bpy = pytest.importorskip("bpy", reason="needs the bpy module: python scripts/te
 
 import bubble_pattern_addon  # noqa: E402
 
-from .parts import add_on_top, plate, select_faces  # noqa: E402
+from .parts import activate, add_on_top, plate, select_faces  # noqa: E402
 
 
 def traces() -> dict[str, list[str]]:
@@ -80,7 +80,7 @@ def a_camera() -> None:
 
 
 def a_pattern() -> None:
-    add_on_top(plate())
+    activate(add_on_top(plate()))
 
 
 def a_base_with_a_pattern() -> None:
@@ -91,7 +91,7 @@ def a_base_with_a_pattern() -> None:
 
 def a_pattern_whose_base_was_deleted() -> None:
     base = plate()
-    add_on_top(base)
+    activate(add_on_top(base))
     bpy.context.collection.objects.unlink(base)
 
 
