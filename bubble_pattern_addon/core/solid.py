@@ -216,7 +216,8 @@ def _unchanged(plan: Plan, mesh: Mesh, facet: Ints, named: Ints, whole: Bools) -
     if moved > slack:
         return False, []
     lost = int((np.bincount(facet[facet >= 0], minlength=len(other))[changed] == 0).sum())
-    if lost == 0:
+    # faces without area are no loss worth telling
+    if lost == 0 or moved < 1e-6 * slack:
         return True, []
     faces = "1 face" if lost == 1 else f"{lost:,} faces"
     return True, [
