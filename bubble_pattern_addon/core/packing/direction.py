@@ -1,10 +1,11 @@
 """A smooth field of row directions over surfaces without a boundary.
 
-A direction carried along from one seed comes back turned round every piece of curvature, and a lattice grown by
-it meets itself in long seams. A field that is smooth everywhere gathers the misfit in a few points (12 on a
-sphere) that keep away from one another; the lattice grown along it has its defects there. Found by diffusing and
-normalising in turn, which lowers the Ginzburg-Landau energy (Viertel and Osting, "An Approach to Quad Meshing
-Based on Harmonic Cross-Valued Maps and the Ginzburg-Landau Theory", 2019, with six directions in place of four).
+A direction carried along from one seed comes back turned round every piece of curvature, and a lattice grown
+by it meets itself in long seams. A field that is smooth everywhere gathers the misfit in a few points (12 on
+a sphere) that keep away from one another; the lattice grown along it has its defects there. Found by
+diffusing and normalising in turn, which lowers the Ginzburg-Landau energy (Viertel and Osting, "An Approach
+to Quad Meshing Based on Harmonic Cross-Valued Maps and the Ginzburg-Landau Theory", 2019, with six directions
+for 4).
 """
 
 from __future__ import annotations

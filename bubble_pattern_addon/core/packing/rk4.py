@@ -20,8 +20,8 @@ def integrate(
 ) -> tuple[Bubbles, Work]:
     """Bubbles after m x'' + c x' = f, until a step moves none by more than `tolerance` pitches.
 
-    At most `iterations` steps. pitch: (n,) the bubbles' local pitch. Positions and forces are projected onto the
-    surface at every stage.
+    At most `iterations` steps. pitch: (n,) the bubbles' local pitch. Positions and forces are projected onto
+    the surface at every stage.
     """
     swarm = swarm_of(ground, bubbles, pitch)
     everyone = np.arange(len(pitch))

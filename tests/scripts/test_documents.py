@@ -1,0 +1,59 @@
+"""README, CHANGELOG and manifest say what is so."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+from bubble_pattern_addon.core.recipe import READERS, recipe_from_dict
+
+ROOT = Path(__file__).resolve().parents[2]
+README = (ROOT / "README.md").read_text("utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
+
+
+def test_the_version_stands_in_the_manifest_alone_and_is_the_newest_of_the_changelog() -> None:
+    version = tomllib.loads((ROOT / "blender_manifest.toml").read_text("utf-8"))["version"]
+    newest = re.search(r"^## (\d+\.\d+\.\d+)", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.MULTILINE)
+    assert newest is not None
+    assert newest[1] == version
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    assert "version" not in project
+
+
+def test_every_link_of_the_readme_leads_somewhere() -> None:
+    links = [link for link in re.findall(r"\]\(([^)]+)\)", README) if "://" not in link]
+    assert links
+    assert [link for link in links if not (ROOT / link).exists()] == []
+
+
+def test_pictures_are_small() -> None:
+    pictures = [*ROOT.glob("docs/*.jpg"), *ROOT.glob("docs/*.png")]
+    assert pictures
+    assert [picture.name for picture in pictures if picture.stat().st_size > 300_000] == []
+
+
+def test_the_readme_s_recipe_is_one() -> None:
+    recipes = blocks("toml")
+    assert recipes
+    for text in recipes:
+        recipe_from_dict(tomllib.loads(text))
+
+
+def test_the_readme_s_table_has_every_key_under_its_table_and_no_other() -> None:
+    told: dict[str, set[str]] = {}
+    section = ""
+    for row in re.findall(r"^\| (`\[\w+\]`)? ?\| `(\w+)", README, re.MULTILINE):
+        section = row[0].strip("`[]") or section
+        told.setdefault(section, set()).add(row[1])
+    assert told == {section: set(readers) for section, readers in READERS.items()}
+
+
+def test_the_readme_s_commands_name_scripts_that_are_there() -> None:
+    scripts = set(re.findall(r"scripts/\w+\.py", README))
+    assert {"scripts/demo.py", "scripts/test.py", "scripts/pattern_batch.py"} <= scripts
+    assert [script for script in scripts if not (ROOT / script).exists()] == []
