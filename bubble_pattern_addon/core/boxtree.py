@@ -15,7 +15,7 @@ import numpy as np
 from .mesh import Bools, Floats, Ints
 
 Overlap = Callable[[Ints, Floats, Floats], Bools]
-"""(questions (m,), box middles (m, 3), box half sizes (m, 3)) -> (m,) may that question meet that box?"""
+"""(questions (m,), box middles (3, m), box half sizes (3, m)) -> (m,) may that question meet that box?"""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def meeting(tree: BoxTree, questions: int, overlap: Overlap) -> tuple[Ints, Ints
     asked = np.arange(questions)
     box = np.zeros(questions, dtype=np.int64)
     for level in range(len(tree.middle) - 1, -1, -1):
-        passed = overlap(asked, tree.middle[level][:, box].T, tree.half[level][:, box].T)
+        passed = overlap(asked, tree.middle[level][:, box], tree.half[level][:, box])
         asked, box = asked[passed], box[passed]
         if level:
             asked, box = np.repeat(asked, 2), np.stack([2 * box, 2 * box + 1], axis=1).ravel()
@@ -71,18 +71,21 @@ def meeting_cylinders(tree: BoxTree, start: Floats, end: Floats, radius: Floats)
     """
     axis = end - start
     length = np.linalg.norm(axis, axis=1)
-    along = axis / length[:, None]
-    centre = (start + end) / 2
-    reach = np.abs(axis) / 2 + radius[:, None]
+    along = np.ascontiguousarray((axis / length[:, None]).T)
+    centre = np.ascontiguousarray((start + end).T / 2)
+    reach = np.ascontiguousarray((np.abs(axis) / 2 + radius[:, None]).T)
 
     def overlap(which: Ints, middle: Floats, half: Floats) -> Bools:
-        offset = middle - centre[which]
-        direction = along[which]
-        apart = np.abs(offset) > reach[which] + half
-        height = np.einsum("ij,ij->i", offset, direction)
-        aside = np.einsum("ij,ij->i", offset, offset) - height**2
-        sphere = radius[which] + np.sqrt(np.einsum("ij,ij->i", half, half))
-        return ~(apart[:, 0] | apart[:, 1] | apart[:, 2]) & (aside <= sphere**2 * (1 + 1e-9))
+        apart = np.zeros(len(which), dtype=bool)
+        height, square, size = np.zeros((3, len(which)))
+        for k in range(3):
+            offset = middle[k] - centre[k][which]
+            apart |= np.abs(offset) > reach[k][which] + half[k]
+            height += offset * along[k][which]
+            square += offset**2
+            size += half[k] ** 2
+        sphere = radius[which] + np.sqrt(size)
+        return ~apart & (square - height**2 <= sphere**2 * (1 + 1e-9))
 
     return meeting(tree, len(start), overlap)
 
