@@ -2,8 +2,8 @@
 
     python scripts/build_extension.py                       # every platform, into dist/
     python scripts/build_extension.py --platform linux-x64  # this one only
-    python scripts/build_extension.py --python-tag cp314    # for a distribution's Blender with a Python of
-    its own python scripts/build_extension.py --validate            # stage and validate, build nothing
+    python scripts/build_extension.py --python-tag cp314    # for a Blender with another Python
+    python scripts/build_extension.py --validate            # stage and validate, build nothing
 
 The wheels are those that blender_manifest.toml lists; pip fetches what wheels/ lacks. Then the package's
 files, the manifest and the wheels are staged into one folder (the builder wants `__init__.py` beside the

@@ -36,28 +36,58 @@ def faced_side(base: Mesh, selected: Bools, original: Mesh) -> Bools:
     rows = np.flatnonzero(selected)
     if not len(rows) or not len(original.triangles):
         return selected
-    normal, size = _unit(base.area_vectors), float(np.linalg.norm(np.ptp(base.vertices, axis=0)))
-    middle = base.corners[rows].mean(axis=1)
-    looks = np.unique(np.linspace(0, len(rows) - 1, min(len(rows), LOOKS)).astype(np.int64))
-    start = np.full(len(looks), 1e-6 * size)
-    far, depth = _first_hit(base.corners, middle[looks], -normal[rows[looks]], start, size)
-    opposed = np.einsum("ij,ij->i", normal[far], normal[rows[looks]]) <= OPPOSED
-    seen = (far >= 0) & selected[far] & opposed
-    if not seen.any():
+    looks, far, depth = _looks_through(base, selected)
+    if not len(looks):
         return selected
+    normal, size = _unit(base.area_vectors[rows]), _size(base)
+    middle = base.corners[rows].mean(axis=1)
     behind = np.full(len(rows), -1)
-    behind[looks[seen]] = np.searchsorted(rows, far[seen])
+    behind[looks] = np.searchsorted(rows, far)
     label, distance = np.zeros(len(rows), dtype=np.int64), np.full(len(rows), np.inf)
-    asked = np.union1d(looks[seen], behind[looks[seen]])
-    label[asked], distance[asked] = _agreement(middle[asked], normal[rows[asked]], original, size)
+    asked = np.union1d(looks, behind[looks])
+    label[asked], distance[asked] = _agreement(middle[asked], normal[asked], original, size)
     thickness = np.ones(len(rows))
-    thickness[looks[seen]] = depth[seen]
+    thickness[looks] = depth
     kept = _decided(base, rows, label, behind, distance / thickness)
     if kept is None or not kept.any():
         return selected
     chosen = np.zeros_like(selected)
     chosen[rows[kept]] = True
     return chosen
+
+
+def lies_on_both_sides(base: Mesh, selected: Bools) -> bool:
+    """Whether most of the `selected` triangles of `base` (T,) have others of them behind their wall."""
+    rows = np.flatnonzero(selected)
+    if not len(rows):
+        return False
+    area = np.linalg.norm(base.area_vectors[rows], axis=1)
+    both = area[_looks_through(base, selected)[0]].sum()
+    return bool(both > area[_sample(len(rows))].sum() / 2)
+
+
+def _looks_through(base: Mesh, selected: Bools) -> tuple[Ints, Ints, Floats]:
+    """Of a sample of the `selected` triangles (T,) those that have another one behind their wall: which
+    of the selected ones they are, the triangle there, and how thick the wall is. All (k,).
+    """
+    rows = np.flatnonzero(selected)
+    looks = _sample(len(rows))
+    own, normal, size = rows[looks], _unit(base.area_vectors), _size(base)
+    start = np.full(len(looks), 1e-6 * size)
+    far, depth = _first_hit(base.corners, base.corners[own].mean(axis=1), -normal[own], start, size)
+    opposed = np.einsum("ij,ij->i", normal[far], normal[own]) <= OPPOSED
+    seen = (far >= 0) & selected[far] & opposed
+    return looks[seen], far[seen], depth[seen]
+
+
+def _sample(count: int) -> Ints:
+    """At most LOOKS of `count` rows, evenly spread."""
+    return np.unique(np.linspace(0, count - 1, min(count, LOOKS)).astype(np.int64))
+
+
+def _size(mesh: Mesh) -> float:
+    """Diagonal of the box round the mesh."""
+    return float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
 
 
 def _agreement(middle: Floats, normal: Floats, original: Mesh, size: float) -> tuple[Ints, Floats]:

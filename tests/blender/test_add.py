@@ -289,6 +289,9 @@ def test_both_sides_selected_by_hand_are_both_filled() -> None:
     pattern = pattern_of(bpy.context.object)
     up = points(pattern, "normal")[:, 2]
     assert (up > 0.5).sum() == (up < -0.5).sum() > 100
+    with pytest.raises(RuntimeError, match="keep one side"):
+        bpy.ops.bubble_pattern.apply()
+    assert set(bpy.data.objects) == {base, pattern}
     pattern.bubble_pattern.depth_mode = 'BLIND'
     pattern.bubble_pattern.depth = 0.002
     assert bpy.ops.bubble_pattern.apply() == {'FINISHED'}

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bubble_pattern_addon.core.mesh import Bools, Floats, Ints, Mesh
-from bubble_pattern_addon.core.sides import LOOKS, faced_side
+from bubble_pattern_addon.core.sides import LOOKS, faced_side, lies_on_both_sides
 
 SIZE = 40.0
 
@@ -106,6 +106,7 @@ def test_sides_selected_by_hand_stay(selected_sides: tuple[int, ...]) -> None:
     selected = np.isin(side, selected_sides)
     kept = faced_side(wall, selected, Mesh(wall.vertices, wall.triangles[selected]))
     assert np.array_equal(kept, selected)
+    assert lies_on_both_sides(wall, selected) == (len(selected_sides) == 2)
 
 
 def test_without_an_original_surface_nothing_is_left_out() -> None:
