@@ -40,6 +40,7 @@ from .properties import (
     pattern_objects,
     recipe_of,
     recipe_text,
+    spoken,
     take_recipe,
 )
 from .provenance import Original, read_original
@@ -176,7 +177,7 @@ def react(settings: Any, context: bpy.types.Context, repack: bool) -> None:
         elif settings.seconds <= LIVE_SECONDS:
             drive(update_steps(obj, context))
     except PatternError as error:
-        settings.trouble = str(error)
+        settings.trouble = spoken(error)
 
 
 def is_only_shape(settings: Any) -> bool:

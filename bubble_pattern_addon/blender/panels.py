@@ -114,8 +114,9 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
         else:
             layout.label(text=obj.name, icon='MOD_PARTICLE_INSTANCE')
         outdated = bool(settings.trouble) or is_outdated(settings)
-        row = layout.row(align=True)
-        if context.mode == 'EDIT_MESH':
+        editing = context.mode == 'EDIT_MESH'
+        row = (large(layout) if editing else layout).row(align=True)
+        if editing:
             row.operator("bubble_pattern.region_assign", text="Assign Region", icon='CHECKMARK')
             if not is_pattern(context.active_object):
                 row.operator("bubble_pattern.add", text="", icon='ADD')
@@ -127,7 +128,9 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
             sentences(layout, settings.trouble, context.region.width, 'ERROR')
         if outdated:
             large(layout).operator("bubble_pattern.update", icon='FILE_REFRESH', depress=True)
-        (layout.row() if outdated else large(layout)).operator("bubble_pattern.apply", icon='CHECKMARK')
+        (layout.row() if outdated or editing else large(layout)).operator(
+            "bubble_pattern.apply", icon='CHECKMARK'
+        )
         layout.operator("bubble_pattern.remove", icon='TRASH')
 
     def draw_applied(

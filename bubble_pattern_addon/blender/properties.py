@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -16,7 +17,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from ..core.errors import RecipeError
+from ..core.errors import PatternError, RecipeError
 from ..core.metric import Constant, Field
 from ..core.recipe import (
     Feature,
@@ -293,6 +294,16 @@ def packing_text(recipe: Recipe) -> str:
 def recipe_text(recipe: Recipe) -> str:
     """What the pattern's points depend on, as text; how the features are cut is left out."""
     return recipe_to_toml(replace(recipe, feature=Feature(), limits=Limits()))
+
+
+def spoken(error: PatternError) -> str:
+    """What `error` says, with the recipe's keys under their names in the sidebar."""
+    known = BubblePatternSettings.bl_rna.properties
+
+    def name_of(key: re.Match[str]) -> str:
+        return known[key[1]].name if key[1] in known else key[0]
+
+    return re.sub(r"\[\w+\] (\w+)", name_of, str(error))
 
 
 def is_outdated(settings: Any) -> bool:

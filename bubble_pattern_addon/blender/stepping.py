@@ -10,6 +10,7 @@ import bpy
 
 from ..core.errors import PatternError
 from ..core.progress import Progress, Steps, drive
+from .properties import spoken
 
 # So long Blender may stand still between two looks at the keyboard, in seconds.
 SLICE = 0.08
@@ -113,7 +114,7 @@ class SteppedOperator:
 
     def refuse(self, error: PatternError) -> set[str]:
         """Report what the user can mend."""
-        self.report({'ERROR'}, str(error))
+        self.report({'ERROR'}, spoken(error))
         return {'CANCELLED'}
 
     def tidy(self, context: bpy.types.Context) -> None:

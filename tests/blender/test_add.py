@@ -241,6 +241,7 @@ def test_settings_lay_the_pattern_anew_as_they_change() -> None:
     settings.pitch *= 2
     assert math.isclose(settings.count, count / 4, rel_tol=0.2)
     settings.diameter = settings.pitch * 1.1
+    assert settings.trouble.startswith("Diameter = ")
     assert "leaves no web" in settings.trouble
     with pytest.raises(RuntimeError, match="leaves no web"):
         bpy.ops.bubble_pattern.update()
