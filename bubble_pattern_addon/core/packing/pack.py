@@ -189,6 +189,8 @@ def _middles(region: Region) -> Spots:
         / weight[:, None]
     )
     away = np.linalg.norm(middle - centre[region.sheet], axis=1)
+    # A closed part has no middle: its first triangle is as good as any, and does not hang on rounding.
+    away[~np.isin(region.sheet, region.sheet[region.rim[:, 0]])] = 0.0
     order = np.lexsort((away, region.sheet))
     first = order[np.searchsorted(region.sheet[order], np.arange(sheets))]
     return Spots(first, np.full((sheets, 3), 1 / 3))

@@ -26,9 +26,10 @@ SKIN = 0.16
 LONGEST_STEP = 0.12
 # Steps between two looks at all bubbles, to see who feels a force.
 BLOCK = 10
-# FIRE's longest time step where contacts have the law's own stiffness (the lattice swings with at most
-# sqrt(6) per unit).
+# FIRE's longest time step at the law's own stiffness; the lattice swings with at most sqrt(6) per unit of time.
 QUICKEST = 0.75
+# FIRE lets its mixing die away; the lattice's quickest swings would then go on for ever at the longest time step.
+LEAST_MIXING = 0.03
 
 
 @dataclass
@@ -225,7 +226,7 @@ def _block(
             velocity += mixing * (size * pull - velocity)
             downhill += 1
             if downhill > 4:
-                pace, mixing = min(1.1 * pace, quickest), 0.99 * mixing
+                pace, mixing = min(1.1 * pace, quickest), max(0.99 * mixing, LEAST_MIXING)
         else:
             velocity = pace * pull
             pace, mixing, downhill = 0.5 * pace, 0.1, 0
