@@ -36,10 +36,11 @@ def pattern_steps(region: Region, recipe: Recipe) -> Steps[Pattern]:
     places = Places(points, region.triangles[spots.row], spots.barycentric)
     first = len(bubbles.first_row.arc)
     links = _links(ground.charts, spots, points, pitch)
+    normal = smooth_normals(region, spots)
     return Pattern(
         places=places,
-        normal=smooth_normals(region, spots),
-        tangent=_tangents(ground.charts, spots, points, links),
+        normal=normal,
+        tangent=_tangents(ground.charts, spots, points, links, normal),
         pitch=pitch,
         diameter=diameters(recipe.shaping, places, pitch),
         row=_rows(links, len(pitch), first),
@@ -64,7 +65,9 @@ def _rows(links: tuple[Ints, Ints], n: int, first: int) -> Ints:
     return np.where(np.isfinite(steps), steps, -1).astype(np.int64)
 
 
-def _tangents(charts: Charts, spots: Spots, points: Floats, links: tuple[Ints, Ints]) -> Floats:
+def _tangents(
+    charts: Charts, spots: Spots, points: Floats, links: tuple[Ints, Ints], normal: Floats
+) -> Floats:
     """Unit vectors (n, 3) along a row of the arrangement: of its six directions the one nearest to the x
     axis.
     """
@@ -78,4 +81,5 @@ def _tangents(charts: Charts, spots: Spots, points: Floats, links: tuple[Ints, I
     angle = np.where(np.abs(six) > 1e-9, np.angle(six), 0.0) / 6
     turns = np.round((np.angle(reference) - angle) / (np.pi / 3))
     tangent = to_space(charts, spots.row, np.exp(1j * (angle + turns * np.pi / 3)))
+    tangent -= np.einsum("nc,nc->n", tangent, normal)[:, None] * normal
     return tangent / np.linalg.norm(tangent, axis=1, keepdims=True)

@@ -26,9 +26,9 @@ SKIN = 0.16
 LONGEST_STEP = 0.12
 # Steps between two looks at all bubbles, to see who feels a force.
 BLOCK = 10
-# FIRE's longest time step at the law's own stiffness; the lattice swings with at most sqrt(6) per unit of time.
+# FIRE's longest time step at the law's own stiffness; the lattice swings with at most sqrt(6) per unit.
 QUICKEST = 0.75
-# FIRE lets its mixing die away; the lattice's quickest swings would then go on for ever at the longest time step.
+# FIRE lets its mixing die away; at the longest time step the lattice's quickest swings would then never end.
 LEAST_MIXING = 0.03
 
 

@@ -59,8 +59,10 @@ class FirstRow:
 
     def wrapped(self) -> Floats:
         """The arcs brought back onto their lines, (n,): a bubble may have slid past a closed one's end."""
-        beyond = np.floor((self.top - self.arc) / np.where(self.around > 0, self.around, 1.0))
-        return np.where(self.around > 0, self.arc + beyond * self.around, self.arc)
+        closed = self.around > 0
+        top = np.where(closed, self.top, self.arc)
+        beyond = np.floor((top - self.arc) / np.where(closed, self.around, 1.0))
+        return self.arc + beyond * self.around
 
 
 def inset_track(charts: Charts, boundary: Boundary, pitch: Lengths, edge_offset: float) -> Track:
