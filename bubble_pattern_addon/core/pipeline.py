@@ -34,7 +34,7 @@ def pattern_steps(region: Region, recipe: Recipe) -> Steps[Pattern]:
     pitch = local_pitch(ground, bubbles)
     points = positions(ground.charts, spots)
     places = Places(points, region.triangles[spots.row], spots.barycentric)
-    first = len(bubbles.first_row.arc)
+    first = len(bubbles.first_row.arc) + bubbles.held
     links = _links(ground.charts, spots, points, pitch)
     normal = smooth_normals(region, spots)
     return Pattern(

@@ -169,7 +169,16 @@ def test_a_pitch_that_is_no_length_is_refused():
 def test_one_bubble_fits_into_a_region_of_its_size():
     region, ground, bubbles = packed("one", 3.5)
     assert len(bubbles) == 1
-    assert np.linalg.norm(points_of(ground, bubbles)[0] - region.corners.reshape(-1, 3).mean(0)) < 1.0
+    middle = region.corners.reshape(-1, 3)
+    assert np.linalg.norm(points_of(ground, bubbles)[0] - (middle.min(0) + middle.max(0)) / 2) < 0.02 * 3.5
+
+
+def test_a_strip_too_narrow_for_two_rows_gets_one_in_its_middle():
+    region, ground, bubbles = packed("strip", 3.0)
+    points = points_of(ground, bubbles)
+    across = int(np.argsort(np.ptp(region.corners.reshape(-1, 3), axis=0))[1])
+    assert len(bubbles) >= 37
+    assert np.abs(points[:, across]).max() < 0.02 * 3.0
 
 
 # --- who lives and who goes

@@ -32,6 +32,7 @@ ROOT = Path(__file__).resolve().parents[2]
 FILL = 0.6
 # features of a plate this fine are for the benchmark
 NAMES = [name for name in SHAPES if name != "plate"]
+NARROW = ("strip", "parts", "one")
 CLOSED = ("sphere", "torus", "capsule")
 
 
@@ -74,7 +75,9 @@ def everything(pattern: Pattern) -> bytes:
     return b"".join(np.ascontiguousarray(column).tobytes() for column in columns)
 
 
-def check_invariants(region: Region, pattern: Pattern, pitch: float, edge_offset: float = 0.0) -> None:
+def check_invariants(
+    region: Region, pattern: Pattern, pitch: float, edge_offset: float = 0.0, narrow: bool = False
+) -> None:
     """On the surface, inside the region, square to it, with the first row along the boundary."""
     places, corners = pattern.places, region.base.corners[pattern.places.triangle]
     assert np.isin(places.triangle, region.triangles).all()
@@ -94,7 +97,8 @@ def check_invariants(region: Region, pattern: Pattern, pitch: float, edge_offset
     first = distance[pattern.row == 0]
     if len(region.boundary_segments):
         assert distance.min() >= (0.5 - 1e-2) * pitch + edge_offset
-        assert first.max() <= (0.5 + 2e-2) * pitch + edge_offset
+        # In places too narrow for two rows a single one runs along the middle.
+        assert first.max() <= (0.95 if narrow else 0.52) * pitch + edge_offset
     else:
         assert (pattern.row == -1).all()
 
@@ -106,7 +110,7 @@ def check_invariants(region: Region, pattern: Pattern, pitch: float, edge_offset
 def test_on_the_surface_inside_the_region_along_the_boundary(name: str) -> None:
     known = laid(name)
     assert len(known.pattern)
-    check_invariants(known.region, known.pattern, known.pitch)
+    check_invariants(known.region, known.pattern, known.pitch, narrow=name in NARROW)
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name != "fold"])
@@ -114,7 +118,9 @@ def test_no_two_features_overlap(name: str) -> None:
     known = laid(name)
     assert min_web(known.pattern) > 0.1 * known.pitch
     if len(known.region.boundary_segments):
-        assert min_margin(known.pattern, known.region) == pytest.approx(0.2 * known.pitch, rel=0.02)
+        margin = min_margin(known.pattern, known.region)
+        assert margin >= 0.2 * known.pitch * 0.98
+        assert name in NARROW or margin <= 0.2 * known.pitch * 1.02
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name not in ("one", "strip")])
@@ -333,7 +339,7 @@ def test_any_plate_keeps_the_laws(plate: tuple[list[Floats], float], triangles: 
     solid = shapes.slab(sheet, 1.0)
     selected = np.arange(len(solid.triangles)) < len(sheet.triangles)
     region, pattern = lay(solid, selected, uniform(pitch))
-    check_invariants(region, pattern, pitch)
+    check_invariants(region, pattern, pitch, narrow=True)
     assert min_web(pattern) > 0
     base_euler = 2 if len(outline) == 1 else 0
     part = cut(solid, pattern)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..boundary import Boundary
-from ..mesh import Floats, Ints
+from ..mesh import Bools, Floats, Ints
 from ..surface import Charts, Spots, positions
 from .rim import FirstRow, Lengths, Track, on_track, spots_on_track
 
@@ -29,12 +29,12 @@ class Ground:
 
 @dataclass(frozen=True)
 class Bubbles:
-    """first_row: m bubbles on the track; free: places of the k others. Arrays over all bubbles have the first
-    row first.
-    """
+    """first_row: m bubbles on the track; free: places of the k others, of which the first `held` stay where
+    they are, in the middle of narrow places. Arrays over all bubbles have the first row first."""
 
     first_row: FirstRow
     free: Spots
+    held: int = 0
 
     def __len__(self) -> int:
         return len(self.first_row.arc) + len(self.free.row)
@@ -65,6 +65,12 @@ def points_and_rows(ground: Ground, bubbles: Bubbles) -> tuple[Floats, Ints, Flo
         np.concatenate([ground.track.spots.row[knot], bubbles.free.row]),
         tangent,
     )
+
+
+def can_move(bubbles: Bubbles) -> Bools:
+    """Which bubbles may move, (n,): all but the held ones."""
+    number = np.arange(len(bubbles)) - len(bubbles.first_row.arc)
+    return (number < 0) | (number >= bubbles.held)
 
 
 def with_arc(row: FirstRow, arc: Floats) -> FirstRow:

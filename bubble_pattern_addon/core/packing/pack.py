@@ -17,6 +17,7 @@ from .crowding import close_pairs, uncrowded
 from .direction import smooth_directions
 from .force import STIFFNESS, stiff_law
 from .lattice import grow
+from .narrows import in_the_narrows
 from .population import control
 from .relax import relax
 from .rim import (
@@ -51,10 +52,11 @@ def pack_steps(region: Region, packing: Packing) -> Steps[tuple[Ground, Bubbles]
     pitch = _pitch_over(region, packing.pitch)
     _check_count(region, pitch)
     ground = _ground(charts, pitch, packing.edge_offset)
-    row = _without_conflicts(ground, first_row(ground.track))
+    row, held = in_the_narrows(ground, _without_conflicts(ground, first_row(ground.track)))
     yield Progress("Growing the lattice", 0.1)
     free = _lattice(ground, row, packing.seed)
-    bubbles = Bubbles(row, free)
+    free = Spots(np.concatenate([held.row, free.row]), np.concatenate([held.barycentric, free.barycentric]))
+    bubbles = Bubbles(row, free, len(held.row))
     if not len(bubbles):
         raise RegionError(
             "No bubble fits into the target region: it is narrower than one pitch everywhere; use a smaller "

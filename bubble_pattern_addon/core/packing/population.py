@@ -17,7 +17,7 @@ from .force import Pairs, find_pairs
 # pitch (it is 0.577 in the hexagonal arrangement, 0.707 in the square one).
 VOID = 0.8
 # Free bubbles nearer to the boundary than this many radii have been pressed through the first row.
-PRESSED_OUT = 1.3
+PRESSED_OUT = 2.2
 # A bubble whose overlap ratio is above this is too crowded; it is 6 in the hexagonal arrangement.
 CROWDED = 8.0
 # Only bubbles with less overlap than this can stand at a void.
@@ -44,12 +44,13 @@ def control(ground: Ground, bubbles: Bubbles, pitch: Floats) -> tuple[Bubbles, i
     ratio = overlap_ratio(pairs, distance, pitch)
     m = len(bubbles.first_row.arc)
     gone = _pressed_out(ground, points[m:], row[m:], pitch[m:]) | _too_crowded(pairs, distance, ratio, m)
+    gone[: bubbles.held] = False
     added = _voids(ground, points, row, pitch, np.flatnonzero(ratio < LONELY))
     if not gone.any() and not len(added.row):
         return bubbles, 0
     stay = bubbles.free.take(~gone)
     free = Spots(np.concatenate([stay.row, added.row]), np.concatenate([stay.barycentric, added.barycentric]))
-    return Bubbles(bubbles.first_row, free), int(gone.sum()) + len(added.row)
+    return Bubbles(bubbles.first_row, free, bubbles.held), int(gone.sum()) + len(added.row)
 
 
 def _pressed_out(ground: Ground, points: Floats, row: Ints, pitch: Floats) -> Bools:

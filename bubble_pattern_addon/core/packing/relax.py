@@ -15,7 +15,7 @@ from scipy.sparse import csr_array
 
 from ..mesh import Bools, Floats, Ints
 from ..surface import Spots, positions, to_frame, walk
-from .bubbles import Bubbles, Ground, points_and_rows, with_arc
+from .bubbles import Bubbles, Ground, can_move, points_and_rows, with_arc
 from .force import Law, Pairs, find_pairs, force_law, renewed_pairs
 from .rim import on_track
 
@@ -85,7 +85,7 @@ def relax(
     # A bubble at rest that feels less than this would move by less than the tolerance in its first step.
     quiet = tolerance / pace**2
     done = 0
-    everyone = np.ones(len(pitch), dtype=bool) if moving is None else moving
+    everyone = can_move(bubbles) if moving is None else moving & can_move(bubbles)
     active = everyone
     while done < iterations:
         pull = pull_on(swarm, links_of(swarm, np.flatnonzero(active)), law)
@@ -118,7 +118,8 @@ def twin(swarm: Swarm) -> Swarm:
 def bubbles_of(swarm: Swarm) -> Bubbles:
     """The bubbles where the swarm has them."""
     m = len(swarm.arc)
-    return Bubbles(with_arc(swarm.bubbles.first_row, swarm.arc), Spots(swarm.row[m:], swarm.bary))
+    row = with_arc(swarm.bubbles.first_row, swarm.arc)
+    return Bubbles(row, Spots(swarm.row[m:], swarm.bary), swarm.bubbles.held)
 
 
 def swarm_of(ground: Ground, bubbles: Bubbles, pitch: Floats) -> Swarm:

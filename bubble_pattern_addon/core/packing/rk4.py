@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..mesh import Floats
-from .bubbles import Bubbles, Ground
+from .bubbles import Bubbles, Ground, can_move
 from .force import Law, force_law
 from .relax import LONGEST_STEP, Work, bubbles_of, links_of, list_anew, move, pull_on, swarm_of, twin
 
@@ -24,9 +24,9 @@ def integrate(
     the surface at every stage.
     """
     swarm = swarm_of(ground, bubbles, pitch)
-    everyone = np.arange(len(pitch))
+    everyone = np.flatnonzero(can_move(bubbles))
     links = links_of(swarm, everyone)
-    velocity = np.zeros((len(pitch), 3))
+    velocity = np.zeros((len(everyone), 3))
     for _ in range(iterations):
         if list_anew(swarm, everyone):
             links = links_of(swarm, everyone)
@@ -35,7 +35,7 @@ def integrate(
             stage = twin(swarm)
             moving, speeding = slopes[-1] if slopes else (velocity, np.zeros_like(velocity))
             if share:
-                move(stage, everyone, share * STEP * moving * pitch[:, None])
+                move(stage, everyone, share * STEP * moving * pitch[everyone, None])
             speed = velocity + share * STEP * speeding
             slopes.append((speed, pull_on(stage, links, law) - DAMPING * speed))
         weights = (1 / 6, 1 / 3, 1 / 3, 1 / 6)
@@ -46,7 +46,7 @@ def integrate(
         velocity = velocity + STEP * sum(
             weight * gain for weight, (_, gain) in zip(weights, slopes, strict=True)
         )
-        move(swarm, everyone, step * pitch[:, None])
+        move(swarm, everyone, step * pitch[everyone, None])
         if longest < tolerance and float(np.abs(slopes[0][1]).max(initial=0.0)) < tolerance / STEP:
             break
     return bubbles_of(swarm), swarm.work
