@@ -78,9 +78,11 @@ class _Crowd:
         self.recent_tree: cKDTree | None = None
 
     def where(self, spots: Spots) -> Floats:
+        """Coordinates (n, 7) in which bubbles on facing sheets are far apart."""
         return signature(self.charts.region, positions(self.charts, spots), spots.row, self.reach)
 
     def add(self, spots: Spots) -> None:
+        """Count the bubbles at `spots` among those born."""
         if not len(spots.row):
             return
         self.recent.append(self.where(spots))
