@@ -76,7 +76,9 @@ def make_charts(region: Region) -> Charts:
     local = np.einsum("rkc,rac->rka", corners - corners[:, :1], axes)
     flat = local[..., 0] + 1j * local[..., 1]
     edges = np.roll(flat, -2, axis=1) - np.roll(flat, -1, axis=1)  # edge opposite to each corner
-    twice_area = np.imag(np.conj(edges[:, 0]) * edges[:, 1])
+    # Not as a product of complex columns: with numpy 1 its last bit hangs on where in memory the result lies.
+    one, two = edges[:, 0], edges[:, 1]
+    twice_area = one.real * two.imag - one.imag * two.real
     gradients = 1j * edges / twice_area[:, None]
     directions = edges / np.abs(edges)
     turns = np.ones_like(directions)
@@ -125,22 +127,32 @@ def walk(charts: Charts, start: Spots, steps: Complex, carried: Complex | None =
         if stopped.any():
             ended = out[stopped]
             row[ended], bary[ended], left[ended] = at[stopped], here[stopped], step[stopped]
-            carried[ended] *= turned[stopped]
+            carried[ended] = product(carried[ended], turned[stopped])
             going = ~stopped
             out, at, here, step, turned = out[going], at[going], here[going], step[going], turned[going]
             corner, beyond, entry = corner[going], beyond[going], entry[going]
         turn = charts.turns[at, corner]
-        here, at, step, turned = _across(here, corner, entry), beyond, step * turn, turned * turn
+        here, at = _across(here, corner, entry), beyond
+        step, turned = product(step, turn), product(turned, turn)
         rate = _rates(charts, at, step)
         there = here + rate
         outside = _outside(there)
         inside = ~outside
         ended = out[inside]
         row[ended], bary[ended] = at[inside], there[inside]
-        carried[ended] *= turned[inside]
+        carried[ended] = product(carried[ended], turned[inside])
         out, at, here, step = out[outside], at[outside], here[outside], step[outside]
         turned, rate = turned[outside], rate[outside]
     return Walk(Spots(row, bary), carried, left)
+
+
+def product(a: Complex, b: Complex) -> Complex:
+    """a times b, both (n,), to the same last bit wherever in memory the result lies.
+
+    numpy 1 multiplies with other instructions, which round differently, where the result touches an operand;
+    an allocator without headers between its blocks puts it there now and then.
+    """
+    return np.multiply(a, b, out=np.empty(len(a) + 2, dtype=np.complex128)[1:-1])
 
 
 def _rates(charts: Charts, row: Ints, steps: Complex) -> Floats:

@@ -131,3 +131,18 @@ def test_bad_regions_are_refused():
     flat = np.concatenate([shape.mesh.triangles, [[0, 1, 1]]])
     with pytest.raises(RegionError, match="no area"):
         make_region(Mesh(shape.mesh.vertices, flat), np.ones(len(flat), bool))
+
+
+def test_the_frames_do_not_hang_on_where_in_memory_they_are_made():
+    """With numpy 1 a product of complex columns does."""
+    shape = SHAPES["panel"]()
+    region = make_region(shape.mesh, np.arange(len(shape.mesh.triangles)) < 100)
+    chance = np.random.default_rng(0)
+    alive: list[object] = []
+    found = set()
+    for _ in range(300):
+        alive.append(np.empty(chance.integers(1, 800), dtype=np.complex128))
+        alive.append(make_charts(region))
+        found.add(alive[-1].gradients.tobytes())
+        alive = alive[-40:]
+    assert len(found) == 1

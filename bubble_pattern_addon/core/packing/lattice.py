@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from ..boundary import signature
 from ..mesh import Floats
-from ..surface import Charts, Complex, Spots, positions, to_frame, to_space, walk
+from ..surface import Charts, Complex, Spots, positions, product, to_frame, to_space, walk
 from .crowding import close_pairs, uncrowded
 
 Lengths = Callable[[Spots], Floats]
@@ -64,7 +64,7 @@ def grow(
 
 def _following(heading: Complex, six: Complex) -> Complex:
     """The headings turned, by less than a twelfth, to where the sixth power is `six`; left where it is 0."""
-    return heading * np.exp(1j * np.where(six != 0, np.angle(six / heading**6), 0.0) / 6)
+    return product(heading, np.exp(1j * np.where(six != 0, np.angle(six / heading**6), 0.0) / 6))
 
 
 class _Crowd:
@@ -107,7 +107,7 @@ def _proposals(
     """
     parent = np.repeat(np.arange(len(front.row)), 6)
     start = front.take(parent)
-    way = heading[parent] * np.tile(SIX, len(front.row))
+    way = product(heading[parent], np.tile(SIX, len(front.row)))
     length = pitch(front)[parent]
     # A straight look ahead spares walking to places that are taken.
     ahead = crowd.where(start)
@@ -155,4 +155,4 @@ def _agreed(
     correction = np.exp(1j * np.angle(mean_six / own) / 6)
     pairs = close_pairs(crowd.where(moved.arrived), CROWDED * local[first])
     kept = uncrowded(pairs, np.lexsort((np.arange(groups), -votes)).argsort())
-    return moved.arrived.take(kept), (moved.carried * correction)[kept]
+    return moved.arrived.take(kept), product(moved.carried, correction)[kept]
