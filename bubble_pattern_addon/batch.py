@@ -14,9 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import IO, Any, NoReturn, Protocol, cast
-
-import numpy as np
+from typing import Any, NoReturn, Protocol, cast
 
 from .core.errors import BaseError, OutputError, PatternError, RecipeError, RegionError
 from .core.export import make_report, write_features, write_report
@@ -32,6 +30,7 @@ from .core.region import Region, make_region
 from .core.selection import select
 from .core.solid import Part, part_steps
 from .core.soundness import sound_base
+from .terminal import line_on
 
 EXAMPLE = """\
 example of a recipe:
@@ -89,9 +88,7 @@ def run_steps(base: LoadedBase, recipe_file: Path) -> Steps[Run]:
     yield Progress("Reading the region", 0.0)
     selected = select(base.mesh, load_recipe(recipe_file).region, base.attributes, base.materials)
     region = make_region(base.mesh, selected)
-    segments = region.boundary_segments
-    perimeter = float(np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1).sum())
-    recipe = load_recipe(recipe_file, default_recipe(region.area, perimeter))
+    recipe = load_recipe(recipe_file, default_recipe(region.area, region.perimeter))
     sound_base(base.mesh)  # step 3 looks again; but nobody shall wait for a packing to be told of a hole
     clock.stop("region")
     pattern = yield from clock.timed(within(pattern_steps(region, recipe), 0.0, 0.5))
@@ -271,20 +268,3 @@ def summary(run: Run, out: Path) -> str:
         f"{figures['features']:,} holes, {100 * figures['open_area']:.1f} % open{webs}; "
         f"watertight part in {out / 'part.stl'}"
     )
-
-
-def line_on(stream: IO[str]) -> Callable[[Progress], None]:
-    """A reporter that keeps one line of `stream` up to date; where that is no terminal, a line per stage."""
-    said = ""
-    terminal = stream.isatty()
-
-    def show(progress: Progress) -> None:
-        nonlocal said
-        if terminal:
-            text = "" if progress.stage == "Done" else f"{progress.stage} {100 * progress.fraction:.0f} %"
-            print(f"\r{text:<60}", end="\r" if not text else "", file=stream, flush=True)
-        elif progress.stage not in (said, "Done"):
-            print(f"{progress.stage} ...", file=stream, flush=True)
-        said = progress.stage
-
-    return show

@@ -107,8 +107,7 @@ def source_of(base: Base, selected: Bools) -> Source:
 
 def fitting_recipe(region: Region) -> Recipe:
     """A good recipe for `region`, from its size alone."""
-    segments = region.boundary_segments
-    return default_recipe(region.area, float(np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1).sum()))
+    return default_recipe(region.area, region.perimeter)
 
 
 def laying_steps(source: Source, recipe: Recipe) -> Steps[Laid]:

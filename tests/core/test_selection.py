@@ -11,10 +11,7 @@ from bubble_pattern_addon.core.mesh import Mesh
 from bubble_pattern_addon.core.recipe import RegionChoice
 from bubble_pattern_addon.core.selection import grown, nearest_triangle, neighbour_pairs, select
 
-
-def as_mesh(body: trimesh.Trimesh) -> Mesh:
-    return Mesh(np.array(body.vertices, dtype=float), np.array(body.faces, dtype=np.int64))
-
+from .bases import as_mesh
 
 BOX = as_mesh(trimesh.creation.box((2, 4, 6)))
 DRUM = as_mesh(trimesh.creation.cylinder(radius=5, height=4, sections=36))
