@@ -176,12 +176,17 @@ def test_preview_shows_every_feature_in_its_size_and_direction() -> None:
     assert np.allclose(along, tangent / np.linalg.norm(tangent, axis=1, keepdims=True), atol=1e-4)
 
 
-def test_a_second_pattern_has_a_region_of_its_own() -> None:
+def two_patterns() -> tuple[bpy.types.Object, bpy.types.Object, bpy.types.Object]:
+    """A base, the pattern on its top, and the one that was added below."""
     base = plate()
     first = add_on_top(base)
     select_faces(base, lambda face: face.normal.z < -0.7)
     bpy.ops.bubble_pattern.add()
-    second = pattern_of(bpy.context.object)
+    return base, first, pattern_of(base)
+
+
+def test_a_second_pattern_has_a_region_of_its_own() -> None:
+    _base, first, second = two_patterns()
     assert second != first
     assert second.bubble_pattern.region != first.bubble_pattern.region
     assert np.allclose(points(first)[:, 2], 0.005)
@@ -189,11 +194,7 @@ def test_a_second_pattern_has_a_region_of_its_own() -> None:
 
 
 def test_the_sidebar_shows_the_newest_pattern_or_the_one_chosen() -> None:
-    base = plate()
-    first = add_on_top(base)
-    select_faces(base, lambda face: face.normal.z < -0.7)
-    bpy.ops.bubble_pattern.add()
-    second = pattern_of(base)
+    base, first, second = two_patterns()
     assert second not in {first, None}
     base.bubble_pattern.pattern = first
     assert pattern_of(base) == first
