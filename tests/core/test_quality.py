@@ -143,7 +143,7 @@ def test_bubbles_in_one_place_have_no_gap():
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(0.001, 1000), st.floats(0, 0.4))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_figures_do_not_depend_on_unit_place_or_direction(seed: int, scale: float, jitter: float):
     rng = np.random.default_rng(seed)
     points = hexagonal(14, 14)
@@ -165,7 +165,7 @@ def test_figures_do_not_depend_on_unit_place_or_direction(seed: int, scale: floa
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(0.05, 0.6))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_planar_neighbours_are_the_delaunay_edges(seed: int, jitter: float):
     rng = np.random.default_rng(seed)
     points = hexagonal(24, 24)
@@ -250,7 +250,7 @@ coordinate = st.floats(-100, 100, allow_nan=False, width=32)
     arrays.arrays(float, st.tuples(st.integers(1, 8), st.just(3)), elements=coordinate),
     arrays.arrays(float, st.tuples(st.integers(1, 30), st.just(2), st.just(3)), elements=coordinate),
 )
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_boundary_distance_is_exact(points: Floats, segments: Floats):
     expected = [min(segment_distance(point, a, b) for a, b in segments) for point in points]
     np.testing.assert_allclose(boundary_distance(points, segments), expected, rtol=1e-9, atol=1e-9)

@@ -61,11 +61,13 @@ def test_triangles_without_area_or_numbers_are_never_the_nearest() -> None:
         nearest_triangle(Mesh(vertices, mesh.triangles[:1]), np.zeros(3))
 
 
+GRID = np.array([[i, j, 40 - i - j] for i in range(41) for j in range(41 - i)]) / 40
+SAMPLES = np.einsum("gk,tkx->tgx", GRID, DRUM.corners)
+
+
 @given(st.tuples(*[st.floats(-20, 20)] * 3))
 def test_the_nearest_triangle_is_the_nearest_by_dense_sampling(point: tuple[float, float, float]) -> None:
-    grid = np.array([[i, j, 40 - i - j] for i in range(41) for j in range(41 - i)]) / 40
-    samples = np.einsum("gk,tkx->tgx", grid, DRUM.corners)
-    sampled = np.linalg.norm(samples - point, axis=2).min(axis=1)
+    sampled = np.linalg.norm(SAMPLES - point, axis=2).min(axis=1)
     chosen = nearest_triangle(DRUM, np.array(point))
     assert sampled[chosen] <= sampled.min() + 0.2  # spacing of the samples on the largest triangle
 

@@ -51,7 +51,7 @@ def inner_part(surface: Mesh) -> Bools:
     return np.abs(surface.corners.mean(axis=1)[:, :2]).max(axis=1) < SIZE / 3
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     cells=st.integers(3, 12),
     thickness=st.floats(0.05, 2.0),
