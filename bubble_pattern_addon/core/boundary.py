@@ -49,12 +49,15 @@ def make_boundary(region: Region, spacing: float) -> Boundary | None:
 
 
 def signature(region: Region, points: Floats, row: Ints, reach: float) -> Floats:
-    """Coordinates (n, 7) in which places on different sheets are far apart although they touch in space.
+    """Coordinates, (n, 3) or (n, 7), in which places on sheets that face each other are far apart although
+    they touch in space. The first three are the points; more are there where the region has such sheets.
 
     points: (n, 3) on the triangles `row` (n,). Normals count with the length `reach`, so that both sides of a
     wall thinner than that are kept apart; parts of the region that are not connected are moved out of one
     another's sight.
     """
+    if region.single_sheet:
+        return points
     apart = 1e3 * (region.extent + reach) * region.sheet[row]
     return np.concatenate([points, reach * region.normals[row], apart[:, None]], axis=1)
 
