@@ -67,9 +67,27 @@ def nearest_boundary(boundary: Boundary, points: Floats, row: Ints) -> tuple[Flo
 
     points: (n, 3) on the triangles `row` (n,)
     """
+    distance, foot, _ = _nearest_segment(boundary, points, row)
+    return distance, foot
+
+
+def inside_distance(boundary: Boundary, points: Floats, row: Ints) -> Floats:
+    """Distance (n,) to the nearest boundary segment, negative on its other side.
+
+    points: (n, 3) in the planes of the triangles `row` (n,) of a flat region, inside it or not
+    """
+    distance, foot, segment = _nearest_segment(boundary, points, row)
+    along = boundary.segments[segment, 1] - boundary.segments[segment, 0]
+    inward = np.cross(boundary.region.normals[row], along)
+    return np.copysign(distance, np.einsum("nc,nc->n", points - foot, inward))
+
+
+def _nearest_segment(boundary: Boundary, points: Floats, row: Ints) -> tuple[Floats, Floats, Ints]:
+    """Distance (n,), nearest point (n, 3) and number (n,) of the nearest boundary segment."""
     count = min(CANDIDATES, len(boundary.owner))
     _, near = boundary.tree.query(signature(boundary.region, points, row, boundary.reach), k=count)
-    ends = boundary.segments[boundary.owner[near.reshape(len(points), count)]]
+    segment = boundary.owner[near.reshape(len(points), count)]
+    ends = boundary.segments[segment]
     start, along = ends[..., 0, :], ends[..., 1, :] - ends[..., 0, :]
     offset = points[:, None] - start
     share = np.einsum("nkc,nkc->nk", offset, along) / np.maximum(
@@ -79,4 +97,4 @@ def nearest_boundary(boundary: Boundary, points: Floats, row: Ints) -> tuple[Flo
     distance = np.linalg.norm(points[:, None] - foot, axis=2)
     best = distance.argmin(axis=1)
     pick = np.arange(len(points))
-    return distance[pick, best], foot[pick, best]
+    return distance[pick, best], foot[pick, best], segment[pick, best]

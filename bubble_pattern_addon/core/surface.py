@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from .mesh import Bools, Floats, Ints
 from .region import Region
@@ -25,6 +26,9 @@ Complex = NDArray[np.complex128]
 INSIDE = -1e-12
 # A search that has crossed so many triangles goes in circles.
 MOST_PASSES = 400
+# One that has crossed LONG triangles asks the nearest of about so many SIGNPOSTS.
+LONG = 8
+SIGNPOSTS = 1500
 # Faces that turn by more than this meet in an edge, not in a smooth surface.
 CREASE = np.radians(35.0)
 
@@ -56,6 +60,20 @@ class Charts:
         turn /= np.abs(turn)
         gradients = self.gradients * turn[:, None]
         return Plane(origin, turn, gradients.real.copy(), gradients.imag.copy())
+
+    @cached_property
+    def signposts(self) -> tuple[cKDTree, Ints]:
+        """Places all over a flat region, (x, y, sheet) in its plane, and the triangles they are in."""
+        corners = self.region.corners
+        sides = np.linalg.norm(np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1), axis=2)
+        spacing = np.sqrt(self.region.area / SIGNPOSTS)
+        number = np.clip(np.ceil(sides.max(axis=1) / spacing), 1, SIGNPOSTS // 10).astype(np.int64)
+        owner = np.repeat(np.arange(len(corners)), number)
+        share = (np.arange(len(owner)) - np.repeat(np.cumsum(number) - number, number) + 0.5) / number[owner]
+        # Along the line from the middle of the shortest side to the corner opposite to it.
+        bary = np.repeat((1 - share)[:, None] / 2, 3, axis=1)
+        bary[np.arange(len(owner)), sides.argmin(axis=1)[owner]] = share
+        return cKDTree(_posted(self, in_plane(self, positions(self, Spots(owner, bary))), owner)), owner
 
 
 class Plane(NamedTuple):
@@ -200,14 +218,17 @@ def search(charts: Charts, row: Ints, ends: Complex) -> tuple[Spots, Bools]:
     """Places of points `ends` (n,) in the plane of a flat region, and which of them (n,) were found.
 
     Every search starts in the triangle `row` and steps over the edge that the point lies farthest beyond: it
-    costs a fraction of a walk. It gives up where only the boundary is in that direction.
+    costs a fraction of a walk. It gives up where only the boundary is in that direction. Those that take
+    long, as where narrow triangles fan out, start anew from the nearest signpost.
     """
     frames, neighbours = charts.plane, charts.region.neighbours
     row = row.copy()
     bary = np.zeros((len(row), 3))
     found = np.zeros(len(row), dtype=bool)
     out, at = np.arange(len(row)), row
-    for _ in range(MOST_PASSES):
+    for number in range(MOST_PASSES):
+        if number == LONG:
+            at = nearest_signpost(charts, ends, at)
         offset = (ends - frames.origin[at])[:, None]
         here = offset.real * frames.across[at] + offset.imag * frames.along[at]
         here[:, 0] += 1
@@ -223,6 +244,20 @@ def search(charts: Charts, row: Ints, ends: Complex) -> tuple[Spots, Bools]:
         going = here[pick, corner] < 0
         out, ends, at = out[going], ends[going], beyond[pick, corner][going]
     return Spots(row, bary), found
+
+
+def nearest_signpost(charts: Charts, ends: Complex, row: Ints) -> Ints:
+    """Triangle (n,) of the signpost nearest to each of the points `ends`, on the sheet of the triangles `row`
+    (n,) or (1,).
+    """
+    tree, owner = charts.signposts
+    return owner[tree.query(_posted(charts, ends, row))[1]]
+
+
+def _posted(charts: Charts, ends: Complex, row: Ints) -> Floats:
+    """Points of the plane with the sheet of their triangles as a third coordinate that keeps sheets apart."""
+    apart = 10 * charts.region.extent * charts.region.sheet[row]
+    return np.stack(np.broadcast_arrays(ends.real, ends.imag, apart), axis=1)
 
 
 def product(a: Complex, b: Complex) -> Complex:
@@ -275,6 +310,8 @@ def smooth_normals(region: Region, spots: Spots) -> Floats:
     Interpolated between corner normals, each the mean (weighted by area) of the triangles round that vertex
     that turn by less than CREASE from this one: a tessellated curve is smooth, an edge stays an edge.
     """
+    if region.flat:
+        return region.normals[spots.row]
     rows, of_spot = np.unique(spots.row, return_inverse=True)
     corner_normals = _corner_normals(region, rows)
     normal = np.einsum("nk,nkc->nc", spots.barycentric, corner_normals[of_spot.reshape(-1)])

@@ -144,8 +144,9 @@ def _lattice(ground: Ground, row: FirstRow, seed: int) -> Spots:
     charts = ground.charts
     seeds, directions = _seeds(ground, seed)
     uniform = ground.uniform if charts.region.flat else None
-    if uniform is not None and fills_its_box(charts, uniform):
-        return _clear_of_rim(ground, lay(charts, uniform, seeds, directions))
+    if uniform is not None and ground.boundary is not None and fills_its_box(charts, uniform):
+        clear = CLEAR_OF_RIM * uniform + ground.edge_offset
+        return lay(charts, ground.boundary, uniform, clear, seeds, directions)
     closed = np.bincount(charts.region.sheet[charts.region.rim[:, 0]], minlength=len(seeds.row)) == 0
     field = smooth_directions(charts, closed[charts.region.sheet]) if closed.any() else None
     if field is not None:

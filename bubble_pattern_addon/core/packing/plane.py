@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..mesh import Floats, Ints
-from ..surface import Charts, Complex, Spots, in_plane, positions, search, to_space
+from ..boundary import Boundary, inside_distance
+from ..mesh import Bools, Floats
+from ..surface import Charts, Complex, Spots, in_plane, nearest_signpost, positions, search, to_space
 
 # A region that fills less than this share of the box round it is not worth laying a lattice over that box.
 LEAST_FILLED = 0.1
@@ -26,12 +27,11 @@ def fills_its_box(charts: Charts, pitch: float) -> bool:
     return region.area > LEAST_FILLED * boxes
 
 
-def lay(charts: Charts, pitch: float, seeds: Spots, directions: Complex) -> Spots:
+def lay(
+    charts: Charts, boundary: Boundary, pitch: float, clear: float, seeds: Spots, directions: Complex
+) -> Spots:
     """Places of the lattices of one `pitch` through `seeds`, one for each part of a flat region, with a row
-    along each seed's direction.
-
-    A lattice point counts where a search over the region finds it, from the nearest triangle or from a
-    neighbour in the lattice.
+    along each seed's direction, as far as they are farther inside the boundary than `clear`.
     """
     region = charts.region
     found: list[Spots] = []
@@ -41,7 +41,11 @@ def lay(charts: Charts, pitch: float, seeds: Spots, directions: Complex) -> Spot
     for sheet in range(len(seeds.row)):
         rows = np.flatnonzero(region.sheet == sheet)
         points = _lattice_points(across[rows].reshape(-1, 2), axes, origin[sheet], along[sheet], pitch)
-        found.append(_on_region(charts, rows, points, pitch))
+        own = np.full(len(points), rows[0])
+        points = points[inside_distance(boundary, points, own) > clear]
+        sought = in_plane(charts, points)
+        spots, there = search(charts, nearest_signpost(charts, sought, rows[:1]), sought)
+        found.append(_all_found(charts, spots, there, points, pitch))
     return Spots(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
 
@@ -67,13 +71,13 @@ def _lattice_points(corners: Floats, axes: Floats, origin: Floats, along: Floats
     return origin + flat @ axes
 
 
-def _on_region(charts: Charts, rows: Ints, points: Floats, pitch: float) -> Spots:
-    """Those of the `points` (n, 3) that are on the triangles `rows`, as places."""
-    middles = positions(charts, Spots(rows, np.full((len(rows), 3), 1 / 3)))
-    _, nearest = cKDTree(middles).query(points)
+def _all_found(charts: Charts, spots: Spots, reached: Bools, points: Floats, pitch: float) -> Spots:
+    """Places of the lattice `points` (n, 3): those `reached`, and the others if they are found from their
+    neighbours, because a part of the boundary lay between them and their signpost.
+    """
+    if reached.all():
+        return spots
     sought = in_plane(charts, points)
-    spots, reached = search(charts, rows[nearest], sought)
-    # What lies behind a part of the boundary from there is found from a neighbour.
     pairs = cKDTree(points).query_pairs(NEXT * pitch, output_type="ndarray")
     pairs = np.concatenate([pairs, pairs[:, ::-1]])
     fresh = reached

@@ -147,7 +147,7 @@ def _block(swarm: Swarm, fire: Fire, links: Links, law: Law, steps: int) -> Link
         if longest > LONGEST_STEP:
             step *= LONGEST_STEP / longest
             longest = LONGEST_STEP
-        move(swarm, active, step * swarm.pitch[active, None], longest)
+        move(swarm, links, step, longest)
         if list_anew(swarm, active, UNSEEN):
             links = links_of(swarm, active)
     fire.velocity[active] = velocity

@@ -36,19 +36,21 @@ def integrate(
             stage = twin(swarm)
             moving, speeding = slopes[-1] if slopes else (velocity, np.zeros_like(velocity))
             if share:
-                move(stage, everyone, share * STEP * moving * pitch[everyone, None], 0.0)
+                move(stage, links, share * STEP * moving, 0.0)
                 land(stage, everyone)
             speed = velocity + share * STEP * speeding
             slopes.append((speed, pull_on(stage, links, law) - DAMPING * speed))
         weights = (1 / 6, 1 / 3, 1 / 3, 1 / 6)
-        step = STEP * sum(weight * moving for weight, (moving, _) in zip(weights, slopes, strict=True))
+        step = np.zeros_like(velocity)
+        for weight, (moving, _) in zip(weights, slopes, strict=True):
+            step += STEP * weight * moving
         longest = float(np.sqrt(np.einsum("nc,nc->n", step, step).max(initial=0.0)))
         if longest > LONGEST_STEP:
             step *= LONGEST_STEP / longest
         velocity = velocity + STEP * sum(
             weight * gain for weight, (_, gain) in zip(weights, slopes, strict=True)
         )
-        move(swarm, everyone, step * pitch[everyone, None], longest)
+        move(swarm, links, step, longest)
         land(swarm, everyone)
         if longest < tolerance and float(np.abs(slopes[0][1]).max(initial=0.0)) < tolerance / STEP:
             break

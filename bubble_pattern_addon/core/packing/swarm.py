@@ -101,16 +101,20 @@ def bubbles_of(swarm: Swarm) -> Bubbles:
 
 @dataclass(frozen=True)
 class Links:
-    """The pairs that act on the bubbles `active` (a,), and the (a + 1, p) matrix that adds up their forces; its
-    last row takes those on all others.
+    """The pairs that act on the bubbles `active` (a,), and the (a + 1, p) matrix that adds up their forces;
+    its last row takes those on all others.
 
-    listed: the list of all pairs that these were taken from
+    rim: how many of them belong to the first row, and slides (rim, 1): 1 for those that may slide, else 0;
+    pitch: (a, 1); softness: (p,) one over the stable distance
     """
 
     active: Ints
     pairs: Pairs
     incidence: csc_array
-    listed: Pairs
+    rim: int
+    slides: Floats
+    pitch: Floats
+    softness: Floats
 
 
 def links_of(swarm: Swarm, active: Ints) -> Links:
@@ -127,7 +131,10 @@ def links_of(swarm: Swarm, active: Ints) -> Links:
     rows = np.stack([place[pairs.first], place[pairs.second]], axis=1).ravel()
     signs = np.tile([1.0, -1.0], number)
     incidence = csc_array((signs, rows, 2 * np.arange(number + 1)), shape=(len(active) + 1, number))
-    return Links(active, pairs, incidence, swarm.pairs)
+    rim = int(np.searchsorted(active, len(swarm.arc)))
+    first = swarm.bubbles.first_row
+    slides = (first.high > first.low)[active[:rim], None].astype(np.float64)
+    return Links(active, pairs, incidence, rim, slides, swarm.pitch[active, None], 1 / pairs.stable)
 
 
 def pull_on(swarm: Swarm, links: Links, law: Law) -> Floats:
@@ -136,45 +143,45 @@ def pull_on(swarm: Swarm, links: Links, law: Law) -> Floats:
     The contact stiffness is k0/l0^2; with masses of 1/pitch^2 bubbles of all sizes swing at the same pace,
     and the balance, where the forces vanish, is that of the law.
     """
-    pairs, active = links.pairs, links.active
+    pairs, active, rim = links.pairs, links.active, links.rim
     swarm.work.evaluations += 1
     swarm.work.bubbles += len(active)
     swarm.work.pairs += len(pairs.first)
-    away = swarm.points[pairs.first] - swarm.points[pairs.second]
+    away = swarm.points.take(pairs.first, axis=0)
+    away -= swarm.points.take(pairs.second, axis=0)
     distance = np.sqrt(np.einsum("mc,mc->m", away, away))
-    away *= (law(distance / pairs.stable) / (pairs.stable * np.maximum(distance, 1e-300)))[:, None]
-    pull = (links.incidence @ away)[:-1] * swarm.pitch[active, None]
-    m = len(swarm.arc)
-    rim = int(np.searchsorted(active, m))
+    away *= (law(distance * links.softness) * links.softness / np.maximum(distance, 1e-300))[:, None]
+    pull = (links.incidence @ away)[:-1]
+    pull *= links.pitch
     if not swarm.ground.charts.region.flat:
         normal = swarm.normal[active[rim:]]
         pull[rim:] -= np.einsum("nc,nc->n", pull[rim:], normal)[:, None] * normal
     if rim:
-        first, tangent = swarm.bubbles.first_row, swarm.tangent[active[:rim]]
-        sliding = (first.high > first.low)[active[:rim]]
-        pull[:rim] = (np.einsum("nc,nc->n", pull[:rim], tangent) * sliding)[:, None] * tangent
+        tangent = swarm.tangent[active[:rim]]
+        pull[:rim] = np.einsum("nc,nc->n", pull[:rim], tangent)[:, None] * links.slides * tangent
     return pull
 
 
-def move(swarm: Swarm, active: Ints, steps: Floats, longest: float) -> None:
-    """Move the active bubbles by `steps` (a, 3), none longer than `longest` pitches: the first row slides
-    along its track, the others step on the surface.
+def move(swarm: Swarm, links: Links, steps: Floats, longest: float) -> None:
+    """Move the active bubbles by `steps` (a, 3) in their pitches, none longer than `longest`: the first row
+    slides along its track, the others step on the surface.
     """
+    active, rim = links.active, links.rim
     if swarm.drift + longest > swarm.afloat:
         land(swarm, active)
     swarm.drift += longest
     swarm.strayed += longest
-    rim = int(np.searchsorted(active, len(swarm.arc)))
+    way = steps * links.pitch
     if rim:
-        sliding, first = active[:rim], swarm.bubbles.first_row
-        pitch, tangent = swarm.pitch[sliding], swarm.tangent[sliding]
-        slide = np.einsum("mc,mc->m", steps[:rim], tangent) / pitch
+        sliding, first, tangent = active[:rim], swarm.bubbles.first_row, swarm.tangent[active[:rim]]
+        slide = np.einsum("mc,mc->m", steps[:rim], tangent)
         arc = np.clip(swarm.arc[sliding] + slide, first.low[sliding], first.high[sliding])
-        swarm.points[sliding] += ((arc - swarm.arc[sliding]) * pitch)[:, None] * tangent
+        way[:rim] = ((arc - swarm.arc[sliding])[:, None] * links.pitch[:rim]) * tangent
         swarm.arc[sliding] = arc
-        swarm.points[active[rim:]] += steps[rim:]
+    if len(active) == len(swarm.points):
+        swarm.points += way
     else:
-        swarm.points[active] += steps
+        swarm.points[active] += way
 
 
 def land(swarm: Swarm, active: Ints) -> None:
