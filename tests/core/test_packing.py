@@ -19,8 +19,9 @@ from bubble_pattern_addon.core.packing.force import find_pairs, force_law, stiff
 from bubble_pattern_addon.core.packing.lattice import grow
 from bubble_pattern_addon.core.packing.pack import local_pitch, pack_steps
 from bubble_pattern_addon.core.packing.population import control, overlap_ratio
-from bubble_pattern_addon.core.packing.relax import links_of, pull_on, relax, swarm_of
+from bubble_pattern_addon.core.packing.relax import relax
 from bubble_pattern_addon.core.packing.rk4 import integrate
+from bubble_pattern_addon.core.packing.swarm import links_of, pull_on, swarm_of
 from bubble_pattern_addon.core.progress import drive
 from bubble_pattern_addon.core.quality import measure_points
 from bubble_pattern_addon.core.recipe import Packing

@@ -17,13 +17,14 @@ from .rim import FirstRow, Lengths, Track, on_track, spots_on_track
 @dataclass(frozen=True)
 class Ground:
     """What bubbles are packed on: the surface, its boundary (None where there is none), the first row's
-    track, the packing metric at places and the edge offset.
+    track, the packing metric at places, its value where it is the same everywhere, and the edge offset.
     """
 
     charts: Charts
     boundary: Boundary | None
     track: Track
     pitch: Lengths
+    uniform: float | None
     edge_offset: float
 
 
