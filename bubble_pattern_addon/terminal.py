@@ -17,6 +17,7 @@ def line_on(stream: IO[str]) -> Callable[[Progress], None]:
     terminal = stream.isatty()
 
     def show(progress: Progress) -> None:
+        """Say where the work stands; the stage "Done" takes the line away."""
         nonlocal said
         if terminal:
             text = "" if progress.stage == "Done" else f"{progress.stage} {100 * progress.fraction:.0f} %"

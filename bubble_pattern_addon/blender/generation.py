@@ -210,6 +210,7 @@ def joined(patterns: list[Pattern]) -> Pattern:
         return patterns[0]
 
     def all_of(values: list[Any]) -> Any:
+        """A column of every pattern, (n,) or (n, w) each, one after the other."""
         return np.concatenate(values)
 
     places = [pattern.places for pattern in patterns]

@@ -297,6 +297,7 @@ def spoken(error: PatternError) -> str:
     known = BubblePatternSettings.bl_rna.properties
 
     def name_of(key: re.Match[str]) -> str:
+        """The sidebar's name of a key such as [packing] pitch; the key itself where the sidebar has none."""
         return known[key[1]].name if key[1] in known else key[0]
 
     return re.sub(r"\[\w+\] (\w+)", name_of, str(error))

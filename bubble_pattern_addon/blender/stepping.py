@@ -22,6 +22,7 @@ def status_of(shown: Latest) -> Callable[[bpy.types.Header, bpy.types.Context], 
     """A function that draws progress in the status bar; a bound method Blender would not take."""
 
     def draw(header: bpy.types.Header, _context: bpy.types.Context) -> None:
+        """Draw a bar with the stage's name, and the key that cancels."""
         progress = shown.latest
         row = header.layout.row(align=True)
         bar = row.row()
@@ -40,9 +41,10 @@ class Latest:
 
 
 class SteppedOperator:
-    """Mixin for an operator whose `steps` is a generator of Progress; `done` gets its result."""
+    """Mixin for an operator whose `steps` is a generator of Progress; `done` gets what it returns."""
 
     def steps(self, context: bpy.types.Context) -> Steps[Any]:
+        """The work. Raises PatternError, which is reported; closed early, it leaves everything as it was."""
         raise NotImplementedError
 
     if TYPE_CHECKING:  # what the operator itself brings
