@@ -28,6 +28,7 @@ from .core.quality import min_margin, min_web
 from .core.recipe import Recipe, default_recipe, load_recipe, recipe_to_toml
 from .core.region import Region, make_region
 from .core.selection import select
+from .core.sides import check_one_side
 from .core.solid import Part, part_steps
 from .core.soundness import sound_base
 from .terminal import line_on
@@ -89,6 +90,8 @@ def run_steps(base: LoadedBase, recipe_file: Path) -> Steps[Run]:
     selected = select(base.mesh, load_recipe(recipe_file).region, base.attributes, base.materials)
     region = make_region(base.mesh, selected)
     recipe = load_recipe(recipe_file, default_recipe(region.area, region.perimeter))
+    if recipe.feature.depth is None:
+        check_one_side(base.mesh, selected)
     sound_base(base.mesh)  # step 3 looks again; but nobody shall wait for a packing to be told of a hole
     clock.stop("region")
     pattern = yield from clock.timed(within(pattern_steps(region, recipe), 0.0, 0.5))

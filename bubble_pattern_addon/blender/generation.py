@@ -26,7 +26,7 @@ from ..core.quality import Quality, measure, min_margin, min_web, open_area
 from ..core.recipe import Recipe, RegionChoice, default_recipe
 from ..core.region import Region, make_region
 from ..core.selection import select
-from ..core.sides import lies_on_both_sides
+from ..core.sides import check_one_side
 from ..core.solid import Part, part_steps
 from .marked_side import on_marked_side
 from .part_mesh import build_part_mesh
@@ -64,10 +64,13 @@ class Laid:
 
 @dataclass(frozen=True)
 class Source:
-    """A base as read for one pattern: geometry, region and what tells whether either has changed."""
+    """A base as read for one pattern: geometry, region, the region's triangles as a mask (T,), and what tells
+    whether any of them has changed.
+    """
 
     base: Base
     region: Region
+    selected: Bools
     fingerprint: str
 
 
@@ -102,7 +105,7 @@ def read_source(obj: bpy.types.Object, attribute: str, context: bpy.types.Contex
 
 def source_of(base: Base, selected: Bools) -> Source:
     """The source of a pattern on the triangles `selected` (T,) of `base`."""
-    return Source(base, make_region(base.mesh, selected), base.fingerprint(selected))
+    return Source(base, make_region(base.mesh, selected), selected, base.fingerprint(selected))
 
 
 def fitting_recipe(region: Region) -> Recipe:
@@ -247,7 +250,7 @@ def apply_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[tupl
     for owner in owners:
         source = read_source(base_object, owner.bubble_pattern.region, context)
         if feature.depth is None:
-            check_one_side(source)
+            check_one_side(source.base.mesh, source.selected)
         if source.fingerprint != owner.bubble_pattern.fingerprint or is_outdated(owner.bubble_pattern):
             yield from update_steps(owner, context)
     base, original = read_whole(base_object, context)
@@ -260,17 +263,6 @@ def apply_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[tupl
         f"{base_object.name} Part", part, pattern.places, base, original, settings.wall_material
     )
     return place_part(base_object, owners, mesh, verdict_of(part), context), part
-
-
-def check_one_side(source: Source) -> None:
-    """Raises RegionError where through-holes would start from both sides of one wall."""
-    chosen = np.zeros(len(source.base.mesh.triangles), dtype=bool)
-    chosen[source.region.triangles] = True
-    if lies_on_both_sides(source.base.mesh, chosen):
-        raise RegionError(
-            "The region is on both sides of the wall, so that holes through it would run into one another: "
-            "edit the region and keep one side, or make the holes blind"
-        )
 
 
 def read_whole(obj: bpy.types.Object, context: bpy.types.Context) -> tuple[Base, Original]:

@@ -139,7 +139,7 @@ class BubblePatternSettings(bpy.types.PropertyGroup):
     iterations: IntProperty(
         name="Iterations",
         description="Most steps the bubbles may take to their equilibrium",
-        default=400,
+        default=Packing().iterations,
         min=1,
         soft_max=2000,
         update=repack,
@@ -147,7 +147,7 @@ class BubblePatternSettings(bpy.types.PropertyGroup):
     tolerance: FloatProperty(
         name="Tolerance",
         description="Stop when no bubble moves farther than this share of its pitch in one step",
-        default=1e-3,
+        default=Packing().tolerance,
         min=1e-9,
         max=1.0,
         precision=5,

@@ -188,6 +188,16 @@ def test_bad_input_gets_one_line_and_leaves_nothing(name: str, run) -> None:
     check_refusal(run(recipe, base), words)
 
 
+def test_only_blind_holes_may_start_from_both_sides_of_a_wall(run) -> None:
+    body = plate()
+    body.face_attributes["both"] = (np.abs(body.face_normals[:, 2]) > 0.9).astype(np.uint8)
+    recipe = GRILLE.replace("near = [0, 0, 2]", "attribute = 'both'")
+    check_refusal(run(recipe, body), "keep one side")
+    code, _, err, folder = run(recipe + "[feature]\ndepth = 0.5\n", body)
+    assert (code, err) == (0, "")
+    assert json.loads((folder / "report.json").read_text())["genus"] == 0
+
+
 def test_a_base_that_passes_through_itself_is_refused(run) -> None:
     shifted = plate().apply_translation((10, 10, 1))
     check_refusal(run(GRILLE, joined(plate(), shifted)), "reach through one another")

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bubble_pattern_addon.core.errors import RegionError
 from bubble_pattern_addon.core.mesh import Bools, Floats, Ints, Mesh
-from bubble_pattern_addon.core.sides import LOOKS, faced_side, lies_on_both_sides
+from bubble_pattern_addon.core.sides import LOOKS, check_one_side, faced_side, lies_on_both_sides
 
 from .bases import grid, halves
 
@@ -104,7 +107,10 @@ def test_sides_selected_by_hand_stay(selected_sides: tuple[int, ...]) -> None:
     selected = np.isin(side, selected_sides)
     kept = faced_side(wall, selected, Mesh(wall.vertices, wall.triangles[selected]))
     assert np.array_equal(kept, selected)
-    assert lies_on_both_sides(wall, selected) == (len(selected_sides) == 2)
+    both = len(selected_sides) == 2
+    assert lies_on_both_sides(wall, selected) == both
+    with pytest.raises(RegionError, match="both sides of the wall") if both else nullcontext():
+        check_one_side(wall, selected)
 
 
 def test_without_an_original_surface_nothing_is_left_out() -> None:
