@@ -23,7 +23,7 @@ from ..core.pattern import Pattern
 from ..core.pipeline import pattern_steps
 from ..core.progress import Progress, Steps, drive
 from ..core.quality import Quality, measure, min_margin, min_web, open_area
-from ..core.recipe import Recipe, RegionChoice, default_recipe
+from ..core.recipe import Recipe, RegionChoice, default_recipe, recipe_from_dict
 from ..core.region import Region, make_region
 from ..core.selection import select
 from ..core.sides import check_one_side
@@ -108,9 +108,21 @@ def source_of(base: Base, selected: Bools) -> Source:
     return Source(base, make_region(base.mesh, selected), selected, base.fingerprint(selected))
 
 
-def fitting_recipe(region: Region) -> Recipe:
-    """A good recipe for `region`, from its size alone."""
-    return default_recipe(region.area, region.perimeter)
+def fitting_recipe(
+    region: Region, attribute: str, pitch: float | None = None, diameter: float | None = None
+) -> Recipe:
+    """A good recipe for `region`, the faces with this attribute: by its size alone where no length is given.
+
+    Of pitch and diameter the one that is given alone takes the other along in proportion. Raises RecipeError
+    where the two do not go together.
+    """
+    fitting = default_recipe(region.area, region.perimeter, RegionChoice(attribute=attribute))
+    given: dict[str, dict[str, float]] = {}
+    if pitch is not None:
+        given["packing"] = {"pitch": pitch}
+    if diameter is not None:
+        given["shaping"] = {"diameter": diameter}
+    return recipe_from_dict(given, fitting)
 
 
 def laying_steps(source: Source, recipe: Recipe) -> Steps[Laid]:

@@ -9,10 +9,10 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty
+from bpy.props import BoolProperty, FloatProperty
 
 from ..core.progress import Progress, Steps
-from .properties import in_scene, is_pattern, pattern_objects, pattern_of, recipe_of
+from .properties import in_scene, is_pattern, length_property, pattern_objects, pattern_of, recipe_of, typed
 from .stepping import SteppedOperator
 from .target_region import free_name, selected_faces, store, stored, trying_region, wanted_faces
 
@@ -48,6 +48,9 @@ def poll_object_mode(cls: Any, context: bpy.types.Context) -> bool:
     return context.mode == 'OBJECT' or refused(cls, "Switch to Object Mode first")
 
 
+SIZE_OR_NONE = {"min": 0.0, "soft_max": 10.0, "options": {'SKIP_SAVE'}}
+
+
 class OnPattern:
     """Mixin for an operator on a pattern, in Object Mode."""
 
@@ -74,6 +77,17 @@ class BUBBLE_PATTERN_OT_add(LayingOperator, bpy.types.Operator):
     bl_idname = "bubble_pattern.add"
     bl_label = "Add Pattern"
     bl_options = {'REGISTER', 'UNDO'}
+
+    # SKIP_SAVE: the next region has a size of its own.
+    pitch: length_property(
+        "Pitch",
+        "Distance between the centers of neighboring features, or 0 to choose it by the region's size",
+        **SIZE_OR_NONE,
+    )
+    diameter: length_property(
+        "Diameter", "Diameter of the features, or 0 to let it follow the pitch", **SIZE_OR_NONE
+    )
+    chosen_diameter: FloatProperty(options={'HIDDEN', 'SKIP_SAVE'})
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -107,7 +121,7 @@ class BUBBLE_PATTERN_OT_add(LayingOperator, bpy.types.Operator):
         with trying_region(base, name):
             store(base, name, wanted_faces(base, name, editing))
             source = generation.read_source(base, name, context)
-            recipe = generation.fitting_recipe(source.region)
+            recipe = generation.fitting_recipe(source.region, name, *self.wanted_lengths())
             laid = yield from generation.laying_steps(source, recipe)
             obj = new_pattern_object(base)
             try:
@@ -118,6 +132,22 @@ class BUBBLE_PATTERN_OT_add(LayingOperator, bpy.types.Operator):
                 raise
         generation.show_part(obj, context, False)
         return obj
+
+    def wanted_lengths(self) -> tuple[float | None, float | None]:
+        """Pitch and diameter as the user wants them; None for what is left to us.
+
+        A diameter that we chose and the user left alone follows another pitch.
+        """
+        own = self.diameter not in (0.0, self.chosen_diameter)
+        return typed(self.pitch) or None, typed(self.diameter) if own else None
+
+    def done(self, context: bpy.types.Context, result: bpy.types.Object) -> None:
+        """Show what was chosen in Adjust Last Operation, to start from."""
+        super().done(context, result)
+        settings = result.bubble_pattern
+        if self.wanted_lengths()[1] is None:
+            self.diameter = self.chosen_diameter = settings.diameter
+        self.pitch = settings.pitch
 
 
 class BUBBLE_PATTERN_OT_update(OnPattern, LayingOperator, bpy.types.Operator):

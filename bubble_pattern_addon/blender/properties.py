@@ -66,7 +66,7 @@ def is_mesh(_settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
     return obj.type == 'MESH'
 
 
-def length_property(name: str, description: str, default: float, **options: Any) -> Any:
+def length_property(name: str, description: str, default: float = 0.0, **options: Any) -> Any:
     """A length in the scene's unit, fine enough for fractions of a millimeter."""
     return FloatProperty(
         name=name,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -51,6 +52,60 @@ def test_a_good_pattern_without_typing_a_number() -> None:
     assert settings.margin > 0
     assert 0.2 < settings.open_area < 0.5
     assert settings.six > 0.9
+
+
+def test_add_takes_pitch_and_diameter_and_lets_the_other_follow() -> None:
+    base = plate()
+    bpy.ops.bubble_pattern.add(pitch=0.006)
+    settings = pattern_of(base).bubble_pattern
+    assert (settings.pitch, settings.diameter) == pytest.approx((0.006, 0.0036))
+    bpy.ops.bubble_pattern.remove()
+    bpy.ops.bubble_pattern.add(diameter=0.003)
+    settings = pattern_of(base).bubble_pattern
+    assert (settings.pitch, settings.diameter) == pytest.approx((0.005, 0.003))
+    bpy.ops.bubble_pattern.remove()
+    bpy.ops.bubble_pattern.add(pitch=0.006, diameter=0.002)
+    settings = pattern_of(base).bubble_pattern
+    assert (settings.pitch, settings.diameter) == pytest.approx((0.006, 0.002))
+    bpy.ops.bubble_pattern.remove()
+    with pytest.raises(RuntimeError, match="smaller than the pitch"):
+        bpy.ops.bubble_pattern.add(pitch=0.006, diameter=0.007)
+    assert list(bpy.data.objects) == [base]
+
+
+def last_operator() -> dict[str, float]:
+    """Properties of the operator that Adjust Last Operation shows."""
+    properties = bpy.context.window_manager.operators[-1].properties
+    return {name: getattr(properties, name) for name in properties.keys()}  # noqa: SIM118
+
+
+def test_adjust_last_operation_shows_what_was_chosen_and_takes_another_pitch() -> None:
+    select_faces(plate(), on_top)
+    bpy.ops.ed.undo_push(message="before")
+    assert bpy.ops.bubble_pattern.add('EXEC_DEFAULT', True) == {'FINISHED'}
+    settings = pattern_of(bpy.context.object).bubble_pattern
+    shown = last_operator()
+    pitch, diameter, count = settings.pitch, settings.diameter, settings.count
+    assert (shown["pitch"], shown["diameter"]) == (pitch, diameter)
+
+    for change, wanted in (
+        ({"pitch": 2 * pitch}, (2 * pitch, 2 * diameter)),
+        ({"diameter": diameter / 2}, (pitch, diameter / 2)),
+        ({"pitch": 2 * pitch, "diameter": diameter / 2}, (2 * pitch, diameter / 2)),
+        ({}, (pitch, diameter)),
+    ):
+        bpy.ops.ed.undo()
+        assert [obj.name for obj in bpy.data.objects] == ["Plate"]
+        assert [mesh.name for mesh in bpy.data.meshes] == ["Cube"]
+        bpy.ops.object.mode_set(mode='OBJECT')
+        assert "bubble_region" not in bpy.data.meshes["Cube"].attributes
+        bpy.ops.object.mode_set(mode='EDIT')
+        assert bpy.ops.bubble_pattern.add('EXEC_DEFAULT', True, **{**shown, **change}) == {'FINISHED'}
+        settings = pattern_of(bpy.context.object).bubble_pattern
+        assert (settings.pitch, settings.diameter) == pytest.approx(wanted, rel=1e-5)
+        assert settings.count == pytest.approx(count * (pitch / wanted[0]) ** 2, rel=0.15)
+        after = last_operator()
+        assert (after["pitch"], after["diameter"]) == pytest.approx(wanted, rel=1e-5)
 
 
 def test_defaults_leave_room_for_rows_in_a_strip() -> None:
@@ -221,7 +276,8 @@ def test_cancelling_leaves_nothing() -> None:
 
     base = plate()
     select_faces(base, on_top)
-    steps = BUBBLE_PATTERN_OT_add.steps(None, bpy.context)
+    operator = SimpleNamespace(wanted_lengths=lambda: (None, None))
+    steps = BUBBLE_PATTERN_OT_add.steps(operator, bpy.context)
     for _ in range(3):
         next(steps)
     steps.close()
