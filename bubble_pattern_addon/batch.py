@@ -11,6 +11,7 @@ import argparse
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -31,7 +32,7 @@ from .core.selection import select
 from .core.sides import check_one_side
 from .core.solid import Part, part_steps
 from .core.soundness import sound_base
-from .terminal import line_on
+from .terminal import line_on, silenced
 
 EXAMPLE = """\
 example of a recipe:
@@ -238,12 +239,15 @@ def main(
     except SystemExit as end:  # --help or a wrong command line: said already
         return int(end.code or 0)
     show = None if options.quiet else report or line_on(sys.stderr)
+    hushed = silenced if options.quiet else nullcontext  # Blender tells of every file it reads and saves
     try:
         load_recipe(options.recipe)  # nonsense is told before a long read
-        base = read_base(options.base, in_blender)
+        with hushed():
+            base = read_base(options.base, in_blender)
         with output_folder(options.out) as folder:
             run = drive(run_steps(base, options.recipe), show)
-            write_run(run, folder, blender_side)
+            with hushed():
+                write_run(run, folder, blender_side)
     except PatternError as error:
         return _failed(prog, str(error), show)
     except MemoryError:

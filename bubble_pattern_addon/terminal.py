@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
+from pathlib import Path
 from typing import IO
 
 from .core.progress import Progress
@@ -31,15 +31,16 @@ def line_on(stream: IO[str]) -> Callable[[Progress], None]:
 
 @contextmanager
 def silenced() -> Iterator[None]:
-    """Send what libraries write straight to the process's standard output to nowhere, Python's prints too."""
-    sys.stdout.flush()
-    kept = os.dup(1)
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nowhere, 1)
-        yield
-    finally:
-        sys.stdout.flush()
-        os.dup2(kept, 1)
-        os.close(kept)
-        os.close(nowhere)
+    """Send what is written to the standard output to nowhere: by Python, and by libraries straight to it."""
+    with Path(os.devnull).open("w", encoding="utf-8") as nowhere, redirect_stdout(nowhere):
+        try:
+            kept = os.dup(1)
+        except OSError:  # a program with windows and no terminal may have none
+            yield
+            return
+        try:
+            os.dup2(nowhere.fileno(), 1)
+            yield
+        finally:
+            os.dup2(kept, 1)
+            os.close(kept)

@@ -116,7 +116,9 @@ def test_the_open_file_is_the_base_of_the_command(tmp_path: Path) -> None:
     assert (out / "part.stl").exists()
 
 
-def test_a_mesh_file_becomes_an_editable_blend(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_mesh_file_becomes_an_editable_blend(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.setattr(batch_base, "render_part", partial(batch_base.render_part, size=(120, 90)))
     x, y, z = 80.0, 60.0, 4.0
     corners = np.array([[i, j, k] for k in (0, z) for j in (0, y) for i in (0, x)])
@@ -134,7 +136,12 @@ def test_a_mesh_file_becomes_an_editable_blend(tmp_path: Path, monkeypatch: pyte
         str(out),
         "--quiet",
     ]
+    capfd.readouterr()
     assert batch.main(arguments) == 0
+    said = capfd.readouterr()
+    assert said.err == ""
+    assert said.out.count("\n") == 1  # nothing of what Blender says of saving and rendering
+    assert "watertight part in" in said.out
     assert picture_has_dark_and_light(out / "part.png")
     check_editable(opened(out), json.loads((out / "report.json").read_text())["features"])
     assert bpy.context.scene.unit_settings.length_unit == 'MILLIMETERS'
