@@ -8,7 +8,6 @@ from scipy.sparse.csgraph import dijkstra
 
 from .mesh import Floats, Ints
 from .metric import Places
-from .packing.bubbles import all_spots
 from .packing.force import find_pairs
 from .packing.pack import local_pitch, pack_steps
 from .pattern import Pattern
@@ -30,11 +29,10 @@ def pattern_steps(region: Region, recipe: Recipe) -> Steps[Pattern]:
     """
     ground, bubbles = yield from pack_steps(region, recipe.packing)
     yield Progress("Shaping the features", 0.95)
-    spots = all_spots(ground, bubbles)
+    spots = bubbles.spots
     pitch = local_pitch(ground, bubbles)
     points = positions(ground.charts, spots)
     places = Places(points, region.triangles[spots.row], spots.barycentric)
-    first = len(bubbles.first_row.arc) + bubbles.held
     links = _links(ground.charts, spots, points, pitch)
     normal = smooth_normals(region, spots)
     return Pattern(
@@ -43,7 +41,7 @@ def pattern_steps(region: Region, recipe: Recipe) -> Steps[Pattern]:
         tangent=_tangents(ground.charts, spots, points, links, normal),
         pitch=pitch,
         diameter=diameters(recipe.shaping, places, pitch),
-        row=_rows(links, len(pitch), first),
+        row=_rows(links, len(pitch), bubbles.fixed),
     )
 
 

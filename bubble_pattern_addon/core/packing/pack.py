@@ -12,7 +12,7 @@ from ..progress import Progress, Steps
 from ..recipe import Packing
 from ..region import Region
 from ..surface import Charts, Complex, Spots, make_charts, positions, to_frame, walk
-from .bubbles import Bubbles, Ground, all_spots
+from .bubbles import Bubbles, Ground, joined
 from .crowding import close_pairs, uncrowded
 from .direction import smooth_directions
 from .force import STIFFNESS, stiff_law
@@ -54,11 +54,11 @@ def pack_steps(region: Region, packing: Packing) -> Steps[tuple[Ground, Bubbles]
     _check_count(region, pitch)
     uniform = packing.pitch.value if isinstance(packing.pitch, Constant) else None
     ground = _ground(charts, pitch, uniform, packing.edge_offset)
-    row, held = in_the_narrows(ground, _without_conflicts(ground, first_row(ground.track)))
+    along, between = in_the_narrows(ground, _without_conflicts(ground, first_row(ground.track)))
+    first = spots_on_track(charts, ground.track, along.arc) if len(along.arc) else _nobody()
     yield Progress("Growing the lattice", 0.1)
-    free = _lattice(ground, row, packing.seed)
-    free = Spots(np.concatenate([held.row, free.row]), np.concatenate([held.barycentric, free.barycentric]))
-    bubbles = Bubbles(row, free, len(held.row))
+    fixed = joined(first, between)
+    bubbles = Bubbles(joined(fixed, _lattice(ground, packing.seed)), len(fixed.row))
     if not len(bubbles):
         raise RegionError(
             "No bubble fits into the target region: it is narrower than one pitch everywhere; use a smaller "
@@ -80,7 +80,7 @@ def pack_steps(region: Region, packing: Packing) -> Steps[tuple[Ground, Bubbles]
 
 def local_pitch(ground: Ground, bubbles: Bubbles) -> Floats:
     """Packing metric at the bubbles, (n,)."""
-    return ground.pitch(all_spots(ground, bubbles))
+    return ground.pitch(bubbles.spots)
 
 
 def _pitch_over(region: Region, field: Field) -> Lengths:
@@ -123,6 +123,10 @@ def _ground(charts: Charts, pitch: Lengths, uniform: float | None, edge_offset: 
     return Ground(charts, boundary, track, pitch, uniform, edge_offset)
 
 
+def _nobody() -> Spots:
+    return Spots(np.empty(0, dtype=np.int64), np.empty((0, 3)))
+
+
 def _where(charts: Charts, spots: Spots, reach: float) -> Floats:
     return signature(charts.region, positions(charts, spots), spots.row, reach)
 
@@ -131,15 +135,14 @@ def _without_conflicts(ground: Ground, row: FirstRow) -> FirstRow:
     """The first row less those too close, as across a neck or in an acute corner; corners go last."""
     if not len(row.arc):
         return row
-    spots = spots_on_track(ground.charts, ground.track, row.wrapped())
+    spots = spots_on_track(ground.charts, ground.track, row.arc)
     local = ground.pitch(spots)
     pairs = close_pairs(_where(ground.charts, spots, float(local.max())), TOO_CLOSE * local)
-    rank = np.lexsort((np.arange(len(local)), row.high > row.low)).argsort()
-    kept = uncrowded(pairs, rank)
-    return FirstRow(*(values[kept] for values in (row.arc, row.low, row.high, row.top, row.around)))
+    rank = np.lexsort((np.arange(len(local)), ~row.corner)).argsort()
+    return row.take(uncrowded(pairs, rank))
 
 
-def _lattice(ground: Ground, row: FirstRow, seed: int) -> Spots:
+def _lattice(ground: Ground, seed: int) -> Spots:
     """Bubbles of a lattice that fills what the first row leaves free."""
     charts = ground.charts
     seeds, directions = _seeds(ground, seed)

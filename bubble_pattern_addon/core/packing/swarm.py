@@ -13,9 +13,8 @@ from scipy.sparse import csc_array
 
 from ..mesh import Floats, Ints
 from ..surface import Spots, positions, to_frame, walk
-from .bubbles import Bubbles, Ground, points_and_rows, with_arc
+from .bubbles import Bubbles, Ground
 from .force import Law, Pairs, find_pairs, renewed_pairs
-from .rim import on_track
 
 # Pairs are listed with this reserve, in pitches (small enough to leave a lattice's next shell out, at 1.73),
 # and a bubble's are listed anew when it has moved by half of that.
@@ -39,13 +38,12 @@ class Work:
 
 @dataclass
 class Swarm:
-    """The bubbles as arrays that the relaxation writes to, the first row (m of them) first.
+    """The bubbles as arrays that the relaxation writes to.
 
     points: (n, 3) where they are now; landed: (n, 3) where they last were exactly on the surface, there in
-    the triangles row (n,), with barycentric coordinates bary (n - m, 3) of the free ones and unit tangents
-    (m, 3) of the first row; arc: (m,) along the track; normal: (n, 3); drift: the farthest any may have moved
-    since, in pitches, and afloat: how far they may; pairs are valid while no bubble is farther than half the
-    skin from listed_at (n, 3), and none is farther from there than strayed, in pitches
+    the triangles row (n,) with barycentric coordinates bary (n, 3) and normal (n, 3); drift: the farthest any
+    may have moved since, in pitches, and afloat: how far they may; pairs are valid while no bubble is farther
+    than half the skin from listed_at (n, 3), and none is farther from there than strayed, in pitches
     """
 
     ground: Ground
@@ -54,10 +52,8 @@ class Swarm:
     points: Floats
     landed: Floats
     row: Ints
-    normal: Floats
-    tangent: Floats
     bary: Floats
-    arc: Floats
+    normal: Floats
     pairs: Pairs
     listed_at: Floats
     drift: float = 0.0
@@ -68,35 +64,32 @@ class Swarm:
 
 def swarm_of(ground: Ground, bubbles: Bubbles, pitch: Floats) -> Swarm:
     """The bubbles as arrays, with their pairs listed."""
-    points, row, tangent = points_and_rows(ground, bubbles)
+    charts, spots = ground.charts, bubbles.spots
+    points = positions(charts, spots)
     return Swarm(
         ground=ground,
         bubbles=bubbles,
         pitch=pitch,
         points=points,
         landed=points.copy(),
-        row=row.copy(),
-        normal=ground.charts.region.normals[row],
-        tangent=tangent,
-        bary=bubbles.free.barycentric.copy(),
-        arc=bubbles.first_row.arc.copy(),
-        pairs=find_pairs(ground.charts, points, row, pitch, SKIN),
+        row=spots.row.copy(),
+        bary=spots.barycentric.copy(),
+        normal=charts.region.normals[spots.row],
+        pairs=find_pairs(charts, points, spots.row, pitch, SKIN),
         listed_at=points.copy(),
     )
 
 
 def twin(swarm: Swarm) -> Swarm:
     """The same bubbles once more, to be moved on trial; the list of pairs is shared."""
-    places = ("points", "landed", "row", "normal", "tangent", "bary", "arc")
+    places = ("points", "landed", "row", "bary", "normal")
     return replace(swarm, **{name: getattr(swarm, name).copy() for name in places})
 
 
 def bubbles_of(swarm: Swarm) -> Bubbles:
     """The bubbles where the swarm has them."""
-    m = len(swarm.arc)
-    _land_free(swarm, np.flatnonzero((swarm.points[m:] != swarm.landed[m:]).any(axis=1)))
-    row = with_arc(swarm.bubbles.first_row, swarm.arc)
-    return Bubbles(row, Spots(swarm.row[m:], swarm.bary), swarm.bubbles.held)
+    _walk_there(swarm, np.flatnonzero((swarm.points != swarm.landed).any(axis=1)))
+    return Bubbles(Spots(swarm.row, swarm.bary), swarm.bubbles.fixed)
 
 
 @dataclass(frozen=True)
@@ -104,15 +97,12 @@ class Links:
     """The pairs that act on the bubbles `active` (a,), and the (a + 1, p) matrix that adds up their forces;
     its last row takes those on all others.
 
-    rim: how many of them belong to the first row, and slides (rim, 1): 1 for those that may slide, else 0;
     pitch: (a, 1); softness: (p,) one over the stable distance
     """
 
     active: Ints
     pairs: Pairs
     incidence: csc_array
-    rim: int
-    slides: Floats
     pitch: Floats
     softness: Floats
 
@@ -131,10 +121,7 @@ def links_of(swarm: Swarm, active: Ints) -> Links:
     rows = np.stack([place[pairs.first], place[pairs.second]], axis=1).ravel()
     signs = np.tile([1.0, -1.0], number)
     incidence = csc_array((signs, rows, 2 * np.arange(number + 1)), shape=(len(active) + 1, number))
-    rim = int(np.searchsorted(active, len(swarm.arc)))
-    first = swarm.bubbles.first_row
-    slides = (first.high > first.low)[active[:rim], None].astype(np.float64)
-    return Links(active, pairs, incidence, rim, slides, swarm.pitch[active, None], 1 / pairs.stable)
+    return Links(active, pairs, incidence, swarm.pitch[active, None], 1 / pairs.stable)
 
 
 def pull_on(swarm: Swarm, links: Links, law: Law) -> Floats:
@@ -143,7 +130,7 @@ def pull_on(swarm: Swarm, links: Links, law: Law) -> Floats:
     The contact stiffness is k0/l0^2; with masses of 1/pitch^2 bubbles of all sizes swing at the same pace,
     and the balance, where the forces vanish, is that of the law.
     """
-    pairs, active, rim = links.pairs, links.active, links.rim
+    pairs, active = links.pairs, links.active
     swarm.work.evaluations += 1
     swarm.work.bubbles += len(active)
     swarm.work.pairs += len(pairs.first)
@@ -154,50 +141,28 @@ def pull_on(swarm: Swarm, links: Links, law: Law) -> Floats:
     pull = (links.incidence @ away)[:-1]
     pull *= links.pitch
     if not swarm.ground.charts.region.flat:
-        normal = swarm.normal[active[rim:]]
-        pull[rim:] -= np.einsum("nc,nc->n", pull[rim:], normal)[:, None] * normal
-    if rim:
-        tangent = swarm.tangent[active[:rim]]
-        pull[:rim] = np.einsum("nc,nc->n", pull[:rim], tangent)[:, None] * links.slides * tangent
+        normal = swarm.normal[active]
+        pull -= np.einsum("nc,nc->n", pull, normal)[:, None] * normal
     return pull
 
 
 def move(swarm: Swarm, links: Links, steps: Floats, longest: float) -> None:
-    """Move the active bubbles by `steps` (a, 3) in their pitches, none longer than `longest`: the first row
-    slides along its track, the others step on the surface.
-    """
-    active, rim = links.active, links.rim
+    """Move the active bubbles by `steps` (a, 3) in their pitches, none longer than `longest`."""
     if swarm.drift + longest > swarm.afloat:
-        land(swarm, active)
+        land(swarm, links.active)
     swarm.drift += longest
     swarm.strayed += longest
-    way = steps * links.pitch
-    if rim:
-        sliding, first, tangent = active[:rim], swarm.bubbles.first_row, swarm.tangent[active[:rim]]
-        slide = np.einsum("mc,mc->m", steps[:rim], tangent)
-        arc = np.clip(swarm.arc[sliding] + slide, first.low[sliding], first.high[sliding])
-        way[:rim] = ((arc - swarm.arc[sliding])[:, None] * links.pitch[:rim]) * tangent
-        swarm.arc[sliding] = arc
-    if len(active) == len(swarm.points):
-        swarm.points += way
-    else:
-        swarm.points[active] += way
+    swarm.points[links.active] += steps * links.pitch
 
 
 def land(swarm: Swarm, active: Ints) -> None:
-    """Bring the active bubbles, who alone have moved, back onto the surface and the track."""
-    m = len(swarm.arc)
-    rim = int(np.searchsorted(active, m))
-    before = swarm.points[active]
-    if rim:
-        sliding = active[:rim]
-        wrapped = with_arc(swarm.bubbles.first_row, swarm.arc).wrapped()[sliding]
-        swarm.points[sliding], swarm.tangent[sliding], knot = on_track(swarm.ground.track, wrapped)
-        swarm.row[sliding] = swarm.ground.track.spots.row[knot]
-    # In a plane the way does not matter, only where it ends.
-    if not swarm.ground.charts.region.flat:
-        _land_free(swarm, active[rim:] - m)
+    """Bring the active bubbles, who alone have moved, back onto the surface."""
     swarm.drift = 0.0
+    # In a plane the way does not matter, only where it ends.
+    if swarm.ground.charts.region.flat:
+        return
+    before = swarm.points[active]
+    _walk_there(swarm, active)
     shift = swarm.points[active] - before
     off = np.sqrt((np.einsum("ac,ac->a", shift, shift) / swarm.pitch[active] ** 2).max(initial=0.0))
     if off > OFF:
@@ -206,15 +171,14 @@ def land(swarm: Swarm, active: Ints) -> None:
         swarm.afloat = min(1.5 * swarm.afloat, FARTHEST)
 
 
-def _land_free(swarm: Swarm, free: Ints) -> None:
-    """Walk the free bubbles numbered `free` over the surface to where they are."""
-    charts, at = swarm.ground.charts, free + len(swarm.arc)
-    start = Spots(swarm.row[at], swarm.bary[free])
-    steps = to_frame(charts, start.row, swarm.points[at] - swarm.landed[at])
+def _walk_there(swarm: Swarm, which: Ints) -> None:
+    """Walk the bubbles `which` over the surface to where they are."""
+    charts, start = swarm.ground.charts, Spots(swarm.row[which], swarm.bary[which])
+    steps = to_frame(charts, start.row, swarm.points[which] - swarm.landed[which])
     arrived = walk(charts, start, steps).arrived
-    swarm.row[at], swarm.bary[free] = arrived
-    swarm.normal[at] = charts.region.normals[arrived.row]
-    swarm.points[at] = swarm.landed[at] = positions(charts, arrived)
+    swarm.row[which], swarm.bary[which] = arrived
+    swarm.normal[which] = charts.region.normals[arrived.row]
+    swarm.points[which] = swarm.landed[which] = positions(charts, arrived)
 
 
 def list_anew(swarm: Swarm, active: Ints, beyond: float) -> bool:
