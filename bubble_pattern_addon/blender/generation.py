@@ -191,7 +191,7 @@ def react(settings: Any, context: bpy.types.Context, repack: bool) -> None:
         elif settings.seconds <= LIVE_SECONDS:
             drive(update_steps(obj, context))
     except PatternError as error:
-        settings.trouble = spoken(error)
+        settings.trouble = spoken(error, context)
 
 
 def is_only_shape(settings: Any) -> bool:

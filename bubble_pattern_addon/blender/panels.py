@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import bpy
 
-from .properties import in_scene, is_outdated, is_pattern, pattern_objects, pattern_of
+from .properties import in_scene, is_outdated, is_pattern, length_text, pattern_objects, pattern_of
 
 
 class SidebarPanel:
@@ -218,10 +218,12 @@ class BUBBLE_PATTERN_PT_result(SettingsPanel, bpy.types.Panel):
         self.layout.active = not is_outdated(settings)
         figures: list[tuple[str, str, bool]] = [("Features", f"{settings.count:,}", settings.count == 0)]
         if settings.count > 1:
-            figures.append(("Smallest Web", length(context, settings.web), settings.web < settings.min_web))
+            figures.append(
+                ("Smallest Web", length_text(context, settings.web), settings.web < settings.min_web)
+            )
         if settings.margin >= 0:
             margin = settings.margin
-            figures.append(("Smallest Margin", length(context, margin), margin < settings.min_margin))
+            figures.append(("Smallest Margin", length_text(context, margin), margin < settings.min_margin))
         figures.append(("Open Area", f"{settings.open_area:.1%}", False))
         if settings.six >= 0:
             figures.append(("Six Neighbors", f"{settings.six:.1%}", False))
@@ -236,16 +238,6 @@ class BUBBLE_PATTERN_PT_result(SettingsPanel, bpy.types.Panel):
             right = split.row()
             right.alert = alert
             right.label(text=figure)
-
-
-def length(context: bpy.types.Context, value: float) -> str:
-    """A length in the scene's unit."""
-    units = context.scene.unit_settings
-    return (
-        bpy.utils.units.to_string(units.system, 'LENGTH', value * units.scale_length, precision=4)
-        if (units.system != 'NONE')
-        else f"{value:.4g}"
-    )
 
 
 CLASSES: tuple[Any, ...] = (

@@ -292,15 +292,27 @@ def recipe_text(recipe: Recipe) -> str:
     return recipe_to_toml(replace(recipe, feature=Feature(), limits=Limits()))
 
 
-def spoken(error: PatternError) -> str:
-    """What `error` says, with the recipe's keys under their names in the sidebar."""
+def length_text(context: bpy.types.Context, value: float) -> str:
+    """A length in the scene's unit."""
+    units = context.scene.unit_settings
+    return (
+        bpy.utils.units.to_string(units.system, 'LENGTH', value * units.scale_length, precision=4)
+        if (units.system != 'NONE')
+        else f"{value:.4g}"
+    )
+
+
+def spoken(error: PatternError, context: bpy.types.Context) -> str:
+    """What `error` says, with the recipe's keys under their names in the sidebar and its lengths in the
+    scene's unit.
+    """
     known = BubblePatternSettings.bl_rna.properties
 
     def name_of(key: re.Match[str]) -> str:
         """The sidebar's name of a key such as [packing] pitch; the key itself where the sidebar has none."""
         return known[key[1]].name if key[1] in known else key[0]
 
-    return re.sub(r"\[\w+\] (\w+)", name_of, str(error))
+    return re.sub(r"\[\w+\] (\w+)", name_of, error.told(lambda value: length_text(context, value)))
 
 
 def is_outdated(settings: Any) -> bool:

@@ -60,7 +60,7 @@ class SteppedOperator:
         try:
             result = drive(self.steps(context))
         except PatternError as error:
-            return self.refuse(error)
+            return self.refuse(error, context)
         self.done(context, result)
         return {'FINISHED'}
 
@@ -107,16 +107,16 @@ class SteppedOperator:
             self.done(context, end.value)
             return {'FINISHED'}
         except PatternError as error:
-            return self.refuse(error)
+            return self.refuse(error, context)
         except BaseException:
             if hasattr(self, "_timer"):
                 self.tidy(context)
             raise
         return None
 
-    def refuse(self, error: PatternError) -> set[str]:
+    def refuse(self, error: PatternError, context: bpy.types.Context) -> set[str]:
         """Report what the user can mend."""
-        self.report({'ERROR'}, spoken(error))
+        self.report({'ERROR'}, spoken(error, context))
         return {'CANCELLED'}
 
     def tidy(self, context: bpy.types.Context) -> None:

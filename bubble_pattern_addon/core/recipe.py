@@ -361,20 +361,28 @@ def _check_room(recipe: Recipe) -> None:
         return
     if diameter.value >= pitch.value:
         raise RecipeError(
-            f"[shaping] diameter = {diameter.value:g} leaves no web at pitch {pitch.value:g}: "
-            "make the diameter smaller than the pitch"
+            "[shaping] diameter = {diameter} leaves no web at pitch {pitch}: "
+            "make the diameter smaller than the pitch",
+            diameter=diameter.value,
+            pitch=pitch.value,
         )
     margin = (pitch.value - diameter.value) / 2 + offset
     if margin < 0:
         raise RecipeError(
-            f"[packing] edge_offset = {offset:g} would push features {-margin:g} over the boundary: "
-            f"give at least {-(pitch.value - diameter.value) / 2:g}"
+            "[packing] edge_offset = {offset} would push features {over} over the boundary: "
+            "give at least {least}",
+            offset=offset,
+            over=-margin,
+            least=(diameter.value - pitch.value) / 2,
         )
     web = pitch.value - diameter.value
     if recipe.limits.min_web > web:
         raise RecipeError(
-            f"[limits] min_web = {recipe.limits.min_web:g} is more than pitch - diameter = {web:g}: "
-            f"make the diameter at most {pitch.value - recipe.limits.min_web:g}"
+            "[limits] min_web = {limit} is more than pitch - diameter = {web}: "
+            "make the diameter at most {most}",
+            limit=recipe.limits.min_web,
+            web=web,
+            most=pitch.value - recipe.limits.min_web,
         )
 
 

@@ -304,6 +304,29 @@ def test_settings_lay_the_pattern_anew_as_they_change() -> None:
         bpy.ops.bubble_pattern.update()
 
 
+@pytest.mark.parametrize(
+    ("system", "scale", "diameter", "pitch"),
+    [
+        ('METRIC', 1.0, "9 mm", "8 mm"),
+        ('METRIC', 0.001, "9 µm", "8 µm"),
+        ('IMPERIAL', 1.0, "354.3 thou", "315 thou"),
+        ('NONE', 1.0, "0.009", "0.008"),
+    ],
+)
+def test_errors_tell_lengths_in_the_scene_s_unit(
+    system: str, scale: float, diameter: str, pitch: str
+) -> None:
+    units = bpy.context.scene.unit_settings
+    units.system, units.scale_length = system, scale
+    settings = add_on_top(plate()).bubble_pattern
+    settings.pitch = 0.008
+    settings.diameter = 0.009
+    told = f"Diameter = {diameter} leaves no web at pitch {pitch}:"
+    assert settings.trouble.startswith(told)
+    with pytest.raises(RuntimeError, match=f"Error: {told}"):
+        bpy.ops.bubble_pattern.update()
+
+
 def test_assigning_another_region() -> None:
     base = plate()
     pattern = add_on_top(base)
