@@ -303,7 +303,7 @@ def plates(draw: st.DrawFn) -> tuple[list[Floats], float]:
     sides = draw(st.integers(3, 7))
     turn = draw(st.floats(0, 6.28))
     angle = turn + np.arange(sides) * 2 * np.pi / sides
-    corners = draw(st.floats(12, 18)) * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    corners = draw(st.floats(14, 20)) * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     stretch = np.array([draw(st.floats(0.8, 2.5)), 1.0])
     radius = draw(st.sampled_from([0.0, 2.0, 5.0]))
     outer = corners * stretch
