@@ -113,7 +113,8 @@ def neat(length: float) -> float:
 
 
 def default_recipe(area: float, perimeter: float = 0.0, choice: RegionChoice | None = None) -> Recipe:
-    """A good recipe for a target region of this area and with boundary loops of this length in all.
+    """A good recipe for a target region of this area and with boundary loops of this length in all, both in
+    the unit of the base; pitch and diameter are lengths in it.
 
     About 500 features, in a hexagonal arrangement where one bubble takes sqrt(3)/2 pitch^2 of the surface; a
     narrow strip, about 2 area / perimeter wide, gets at least three rows. The diameter is 0.6 of the pitch.
@@ -274,12 +275,17 @@ def _texts(value: object, where: str) -> tuple[str, ...]:
 
 
 def field_from_toml(value: object, where: str) -> Field:
-    """The field that a recipe's value describes: a number is the same everywhere."""
+    """The field that a recipe's value describes: a number is the same everywhere.
+
+    where: how a message names the value, such as "[packing] pitch". Raises RecipeError for anything else.
+    """
     return Constant(_number(value, where))
 
 
 def field_to_toml(value: Field) -> str:
-    """TOML's spelling of a field, such that field_from_toml gives the field again."""
+    """TOML's spelling of a field, such that field_from_toml gives the field again. TypeError where there is
+    none.
+    """
     if isinstance(value, Constant):
         return repr(float(value.value))
     raise TypeError(f"no TOML spelling for a field of type {type(value).__name__}")
@@ -355,20 +361,28 @@ def _check_room(recipe: Recipe) -> None:
         return
     if diameter.value >= pitch.value:
         raise RecipeError(
-            f"[shaping] diameter = {diameter.value:g} leaves no web at pitch {pitch.value:g}: "
-            "make the diameter smaller than the pitch"
+            "[shaping] diameter = {diameter} leaves no web at pitch {pitch}: "
+            "make the diameter smaller than the pitch",
+            diameter=diameter.value,
+            pitch=pitch.value,
         )
     margin = (pitch.value - diameter.value) / 2 + offset
     if margin < 0:
         raise RecipeError(
-            f"[packing] edge_offset = {offset:g} would push features {-margin:g} over the boundary: "
-            f"give at least {-(pitch.value - diameter.value) / 2:g}"
+            "[packing] edge_offset = {offset} would push features {over} over the boundary: "
+            "give at least {least}",
+            offset=offset,
+            over=-margin,
+            least=(diameter.value - pitch.value) / 2,
         )
     web = pitch.value - diameter.value
     if recipe.limits.min_web > web:
         raise RecipeError(
-            f"[limits] min_web = {recipe.limits.min_web:g} is more than pitch - diameter = {web:g}: "
-            f"make the diameter at most {pitch.value - recipe.limits.min_web:g}"
+            "[limits] min_web = {limit} is more than pitch - diameter = {web}: "
+            "make the diameter at most {most}",
+            limit=recipe.limits.min_web,
+            web=web,
+            most=pitch.value - recipe.limits.min_web,
         )
 
 

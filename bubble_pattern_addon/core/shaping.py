@@ -22,7 +22,9 @@ def diameters(shaping: Shaping, places: Places, pitch: Floats) -> Floats:
     if over.any():
         at = int(np.argmax(diameter / pitch))
         raise RecipeError(
-            f"The diameter {diameter[at]:.4g} is not smaller than the pitch {pitch[at]:.4g}: "
-            "features would touch; use a smaller diameter or a larger pitch."
+            "The diameter {diameter} is not smaller than the pitch {pitch}: "
+            "features would touch; use a smaller diameter or a larger pitch.",
+            diameter=float(diameter[at]),
+            pitch=float(pitch[at]),
         )
     return diameter
