@@ -91,9 +91,9 @@ def run_steps(base: LoadedBase, recipe_file: Path) -> Steps[Run]:
     selected = select(base.mesh, load_recipe(recipe_file).region, base.attributes, base.materials)
     region = make_region(base.mesh, selected)
     recipe = load_recipe(recipe_file, default_recipe(region.area, region.perimeter))
+    sound_base(base.mesh)  # step 3 looks again; but nobody shall wait for a packing to be told of a hole
     if recipe.feature.depth is None:
         check_one_side(base.mesh, selected)
-    sound_base(base.mesh)  # step 3 looks again; but nobody shall wait for a packing to be told of a hole
     clock.stop("region")
     pattern = yield from clock.timed(within(pattern_steps(region, recipe), 0.0, 0.5))
     check_limits(recipe, region, pattern)

@@ -79,8 +79,10 @@ def _evened(ground: Ground, row: FirstRow, spots: Spots, narrow: Bools) -> Spots
                 for piece in np.split(run, _breaks(points[run], pitch[run]))
                 if narrow[piece].any()
             ]
-    found = joined(*placed)
+    found = joined(*placed) if placed else spots.take(np.zeros(0, dtype=np.int64))
     found = found.take(_keeps_clear(ground, found))
+    if not len(found.row):
+        return found
     pitch = ground.pitch(found)
     where = signature(ground.charts.region, positions(ground.charts, found), found.row, float(pitch.max()))
     return found.take(uncrowded(close_pairs(where, TOO_CLOSE * pitch), np.arange(len(pitch))))

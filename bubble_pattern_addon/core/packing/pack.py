@@ -19,7 +19,7 @@ from .force import STIFFNESS, stiff_law
 from .lattice import grow
 from .narrows import in_the_narrows
 from .plane import fills_its_box, lay
-from .population import control
+from .population import control, pressed_out
 from .relax import relax
 from .rim import (
     FirstRow,
@@ -73,9 +73,14 @@ def pack_steps(region: Region, packing: Packing) -> Steps[tuple[Ground, Bubbles]
         if not changed:
             break
     yield Progress("Evening out the gaps", 0.8)
-    local = local_pitch(ground, bubbles)
-    bubbles, _ = relax(ground, bubbles, local, STIFF_STEPS, packing.tolerance, stiff_law, 1.0 + STIFFNESS)
-    return ground, bubbles
+    while True:
+        local = local_pitch(ground, bubbles)
+        bubbles, _ = relax(ground, bubbles, local, STIFF_STEPS, packing.tolerance, stiff_law, 1.0 + STIFFNESS)
+        kept = ~pressed_out(ground, bubbles, local_pitch(ground, bubbles))
+        if kept.all():
+            return ground, bubbles
+        # What stiff contacts have squeezed through the first row has no place between it and the boundary.
+        bubbles = Bubbles(bubbles.spots.take(kept), bubbles.fixed)
 
 
 def local_pitch(ground: Ground, bubbles: Bubbles) -> Floats:

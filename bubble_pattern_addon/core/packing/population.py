@@ -19,7 +19,7 @@ VOID = 0.8
 # Free bubbles nearer to the boundary than this many radii have been pressed through the first row.
 PRESSED_OUT = 2.2
 # A bubble whose overlap ratio is above this is too crowded; it is 6 in the hexagonal arrangement.
-CROWDED = 8.0
+CROWDED = 6.8
 # Only bubbles with less overlap than this can stand at a void.
 LONELY = 5.6
 
@@ -42,20 +42,22 @@ def control(ground: Ground, bubbles: Bubbles, pitch: Floats) -> tuple[Bubbles, i
     pairs = find_pairs(ground.charts, points, row, pitch, 0.0)
     distance = np.linalg.norm(points[pairs.first] - points[pairs.second], axis=1)
     ratio = overlap_ratio(pairs, distance, pitch)
-    gone = np.zeros(len(bubbles), dtype=bool)
-    gone[m:] = pressed_out(ground, points[m:], row[m:], pitch[m:]) | _too_crowded(pairs, distance, ratio, m)
+    gone = pressed_out(ground, bubbles, pitch)
+    gone[m:] |= _too_crowded(pairs, distance, ratio, m)
     added = _voids(ground, points, row, pitch, np.flatnonzero(ratio < LONELY))
     if not gone.any() and not len(added.row):
         return bubbles, 0
     return Bubbles(joined(bubbles.spots.take(~gone), added), m), int(gone.sum()) + len(added.row)
 
 
-def pressed_out(ground: Ground, points: Floats, row: Ints, pitch: Floats) -> Bools:
-    """Free bubbles between the first row and the boundary."""
-    if ground.boundary is None or not len(points):
-        return np.zeros(len(points), dtype=bool)
-    distance, _ = nearest_boundary(ground.boundary, points, row)
-    return distance < PRESSED_OUT * pitch / 2 + ground.edge_offset
+def pressed_out(ground: Ground, bubbles: Bubbles, pitch: Floats) -> Bools:
+    """Which bubbles, (n,), are between the first row and the boundary."""
+    out = np.zeros(len(bubbles), dtype=bool)
+    free = bubbles.spots.take(np.arange(bubbles.fixed, len(bubbles)))
+    if ground.boundary is not None and len(free.row):
+        distance, _ = nearest_boundary(ground.boundary, positions(ground.charts, free), free.row)
+        out[bubbles.fixed :] = distance < PRESSED_OUT * pitch[bubbles.fixed :] / 2 + ground.edge_offset
+    return out
 
 
 def _too_crowded(pairs: Pairs, distance: Floats, ratio: Floats, m: int) -> Bools:

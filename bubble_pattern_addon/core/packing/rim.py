@@ -212,7 +212,7 @@ def _knots(
         barys.append(spots.barycentric[run])
         if number + 1 < len(chain) or closed:
             corner = _corner(charts, spots, run, chain[(number + 1) % len(chain)])
-            if corner is not None:
+            if corner is not None and _keeps_radius(charts, boundary, radius, corner):
                 rows.append(corner.row)
                 barys.append(corner.barycentric)
     if closed:
@@ -239,6 +239,12 @@ def _corner(charts: Charts, spots: Spots, before: Ints, after: Ints) -> Spots | 
         return None
     last = spots.take(before[-1:])
     return walk(charts, last, to_frame(charts, last.row, reach * ahead[None])).arrived
+
+
+def _keeps_radius(charts: Charts, boundary: Boundary, radius: Lengths, corner: Spots) -> bool:
+    """Whether a corner is on the inset line: beside a rounded one, lines meet outside it."""
+    distance, _ = _to_boundary(charts, boundary, corner)
+    return bool((distance > (1 - 1e-2) * radius(corner)).all())
 
 
 def _filled(charts: Charts, boundary: Boundary, radius: Lengths, knots: Spots) -> Spots:
