@@ -18,7 +18,9 @@ from ..surface import Charts, Complex
 
 # Diffusion per round as a share of the area, falling: far misfits first, near ones after.
 SPREAD = (0.003, 0.0005)
-ROUNDS = 12
+ROUNDS, LAST_ROUNDS = 12, 3
+# Patches of triangles that are enough for the far misfits.
+ENOUGH = 2500
 # A round is solved to this share of its right side, in at most so many steps.
 NEARLY = 0.05
 MOST_STEPS = 200
@@ -45,18 +47,60 @@ def smooth_directions(charts: Charts, chosen: Bools) -> Complex:
     # Row `beyond` of the Laplacian takes the neighbour's value, turned into its own frame.
     links = coo_array((weight * transport, (place[beyond], place[row])), shape=(n, n))
     degree = np.bincount(place[row], weight, n)
-    laplacian = (diags_array(degree.astype(np.complex128)) - links).tocsc()
+    laplacian = (diags_array(degree.astype(np.complex128)) - links).tocsr()
     parts = np.bincount(region.sheet[members], area, int(region.sheet.max()) + 1)[region.sheet[members]]
+    area = area / parts
+    # Far misfits meet as well between patches of triangles, which are few; the triangles finish it.
+    patches, coarse, share = [], laplacian, area
+    while coarse.shape[0] > ENOUGH:
+        patch = _paired(coarse)
+        patches.append(patch)
+        coarse, share = (patch.conj().T @ coarse @ patch).tocsr(), abs(patch).T @ share
     # The frames' own directions, which are at odds: from a smooth start, such as one direction of space seen
     # on the surface, the misfits that belong to it never part.
-    value = np.ones(n, dtype=np.complex128)
+    value = np.ones(coarse.shape[0], dtype=np.complex128)
     for spread in SPREAD:
-        implicit = (diags_array((area / parts).astype(np.complex128)) + spread * laplacian).tocsr()
-        for _ in range(ROUNDS):
-            value = _solved(implicit, area / parts * value, value)
-            value /= np.maximum(np.abs(value), 1e-300)
+        value = _diffused(coarse, share, value, spread, ROUNDS)
+    for patch in reversed(patches):
+        value = patch @ value
+    if patches:
+        value = _diffused(laplacian, area, value, SPREAD[-1], LAST_ROUNDS)
     result[members] = value
     return result
+
+
+def _paired(laplacian: csr_array) -> csr_array:
+    """Matrix (n, m) that gives each of n patches the value of the larger one it is a part of, turned into its
+    own frame: patches that have each other for best neighbour are joined in pairs.
+    """
+    n = laplacian.shape[0]
+    row = np.repeat(np.arange(n), np.diff(laplacian.indptr))
+    column, link = laplacian.indices, laplacian.data
+    beside = row != column
+    row, column, link = row[beside], column[beside], link[beside]
+    # Links of equal weight are told apart by an even scatter, else few are each other's best.
+    low, high = np.minimum(row, column).astype(np.float64), np.maximum(row, column)
+    weight = np.abs(link) * (1 + 0.3 * np.modf(low * 0.6180339887 + high * 0.4142135624)[0])
+    order = np.lexsort((weight, row))
+    last = np.flatnonzero(np.append(np.diff(row[order]) != 0, True))
+    best, turn = np.full(n, -1), np.ones(n, dtype=np.complex128)
+    best[row[order[last]]] = column[order[last]]
+    turn[row[order[last]]] = -link[order[last]] / np.abs(link[order[last]])
+    number = np.arange(n)
+    mutual = (best >= 0) & (best[best] == number)
+    follows = mutual & (best < number)
+    leader = np.where(follows, best, number)
+    place = np.cumsum(~follows) - 1
+    return csr_array((np.where(follows, turn, 1.0), (number, place[leader])))
+
+
+def _diffused(laplacian: csr_array, area: Floats, value: Complex, spread: float, rounds: int) -> Complex:
+    """Unit values after `rounds` of diffusing and normalising."""
+    implicit = (diags_array(area.astype(np.complex128)) + spread * laplacian).tocsr()
+    for _ in range(rounds):
+        value = _solved(implicit, area * value, value)
+        value = value / np.maximum(np.abs(value), 1e-300)
+    return value
 
 
 def _solved(matrix: csr_array, right: Complex, guess: Complex) -> Complex:

@@ -24,9 +24,9 @@ Lengths = Callable[[Spots], Floats]
 
 SIX = np.exp(1j * np.pi / 3 * np.arange(6))
 # Proposals closer together than this share of the pitch mean the same place; bubbles are born no closer than
-# CROWDED.
+# CROWDED, or CROWDED_CLOSED where no boundary gives way and gaps between what has grown apart would stay.
 SAME = 0.5
-CROWDED = 0.78
+CROWDED, CROWDED_CLOSED = 0.78, 0.7
 # Bubbles of so many generations are searched anew for each generation; older ones only when they have become
 # many.
 RECENT = 4
@@ -41,7 +41,8 @@ def grow(
     after generation. Ends early when there are more than `most`. With a `field` of sixth powers of directions
     in the triangles' frames, (R,), the rows follow it wherever it is not 0.
     """
-    crowd = _Crowd(charts, float(pitch(seeds).max()))
+    crowded = CROWDED if field is None else CROWDED_CLOSED
+    crowd = _Crowd(charts, float(pitch(seeds).max()), crowded)
     spots, heading = seeds, directions
     crowd.add(seeds)
     front, front_heading = seeds, directions
@@ -70,8 +71,8 @@ def _following(heading: Complex, six: Complex) -> Complex:
 class _Crowd:
     """Bubbles born so far, to be asked who is near: it keeps search trees from one question to the next."""
 
-    def __init__(self, charts: Charts, reach: float) -> None:
-        self.charts, self.reach = charts, reach
+    def __init__(self, charts: Charts, reach: float, crowded: float) -> None:
+        self.charts, self.reach, self.crowded = charts, reach, crowded
         self.old: list[Floats] = []
         self.old_tree: cKDTree | None = None
         self.recent: list[Floats] = []
@@ -134,7 +135,7 @@ def _agreed(
         return proposals, heading
     local = pitch(proposals)
     at = crowd.where(proposals)
-    free = crowd.distance(at, CROWDED * local.max()) > CROWDED * local
+    free = crowd.distance(at, crowd.crowded * local.max()) > crowd.crowded * local
     proposals, heading, local, at = proposals.take(free), heading[free], local[free], at[free]
     if not len(local):
         return proposals, heading
@@ -153,6 +154,6 @@ def _agreed(
     mean_six = np.bincount(group, six.real, groups) + 1j * np.bincount(group, six.imag, groups)
     own = heading[first] ** 6
     correction = np.exp(1j * np.angle(mean_six / own) / 6)
-    pairs = close_pairs(crowd.where(moved.arrived), CROWDED * local[first])
+    pairs = close_pairs(crowd.where(moved.arrived), crowd.crowded * local[first])
     kept = uncrowded(pairs, np.lexsort((np.arange(groups), -votes)).argsort())
     return moved.arrived.take(kept), product(moved.carried, correction)[kept]
