@@ -17,10 +17,11 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
+from bubble_pattern_addon.core.distance import boundary_distance
 from bubble_pattern_addon.core.mesh import Floats, Ints
 from bubble_pattern_addon.core.metric import Constant
 from bubble_pattern_addon.core.progress import drive
-from bubble_pattern_addon.core.quality import Quality, boundary_distance, measure_points, neighbours
+from bubble_pattern_addon.core.quality import Quality, measure_points, neighbours
 from bubble_pattern_addon.core.recipe import Packing, Recipe, Shaping
 from bubble_pattern_addon.core.region import make_region
 from scripts.shapes import SHAPES

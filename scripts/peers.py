@@ -19,8 +19,8 @@ from scipy.spatial import cKDTree
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
+from bubble_pattern_addon.core.distance import boundary_distance
 from bubble_pattern_addon.core.mesh import Floats, Mesh
-from bubble_pattern_addon.core.quality import boundary_distance
 from scripts.shapes import ISLAND, TRAPEZOID, TRAPEZOID_RADIUS, inside_outline, outline_segments
 
 NEAR_ENOUGH = 0.02

@@ -15,13 +15,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
+from bubble_pattern_addon.core.distance import boundary_distance
 from bubble_pattern_addon.core.errors import RegionError
 from bubble_pattern_addon.core.mesh import Floats, Mesh
 from bubble_pattern_addon.core.metric import Constant
 from bubble_pattern_addon.core.pattern import Pattern
 from bubble_pattern_addon.core.pipeline import pattern_steps
 from bubble_pattern_addon.core.progress import Progress, drive
-from bubble_pattern_addon.core.quality import boundary_distance, measure, min_margin, min_web
+from bubble_pattern_addon.core.quality import measure, min_margin, min_web
 from bubble_pattern_addon.core.recipe import Feature, Packing, Recipe, Shaping
 from bubble_pattern_addon.core.region import Region, make_region
 from bubble_pattern_addon.core.solid import Part, part_steps
