@@ -91,3 +91,25 @@ class Constant(Described):
     def __call__(self, places: Places) -> Floats:
         """The value, (n,)."""
         return np.full(len(places), self.value)
+
+
+@dataclass(frozen=True)
+class Bound(Described):
+    """A field that has its surroundings, where a description is asked for; `field` is what was bound."""
+
+    field: Field
+
+    def bind(self, surroundings: Surroundings) -> Field:
+        """The field, bound once and for all."""
+        return self.field
+
+    def bounds(self) -> Bounds:
+        """Nothing is known of its values."""
+        return -np.inf, np.inf
+
+    def check(self, where: str) -> None:
+        """Whatever was bound made sense."""
+
+    def __call__(self, places: Places) -> Floats:
+        """Values at `places`, (n,)."""
+        return self.field(places)
