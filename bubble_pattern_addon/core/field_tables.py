@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
+from dataclasses import MISSING, Field, dataclass, fields, is_dataclass, replace
 from typing import Any
 
 from .blending import Blend, FaceSet, Fill, Least, Most, Product, SubRegions
@@ -181,6 +181,24 @@ def wanted(*described: Described) -> Wanted:
         images=names(Image, "image"),
         objects=names(Radial, "object") | frozenset(objects),
     )
+
+
+def with_images(described: Described, names: Mapping[str, str]) -> Described:
+    """The same field with its images called by other names."""
+    changed = _with_images(described, names)
+    assert isinstance(changed, Described)
+    return changed
+
+
+def _with_images(value: object, names: Mapping[str, str]) -> object:
+    if isinstance(value, tuple):
+        return tuple(_with_images(entry, names) for entry in value)
+    if isinstance(value, Image):
+        return replace(value, image=names.get(value.image, value.image))
+    if isinstance(value, (Described, FaceSet)):
+        parts = {f.name: _with_images(getattr(value, f.name), names) for f in fields(value)}  # type: ignore[arg-type]
+        return replace(value, **parts)  # type: ignore[type-var]
+    return value
 
 
 def _parts(value: object) -> Iterator[object]:

@@ -87,7 +87,9 @@ def check_invariants(
     on_surface = np.einsum("nk,nkc->nc", places.barycentric, corners)
     assert np.linalg.norm(on_surface - pattern.position, axis=1).max() < 1e-4 * pitch
     assert (pattern.pitch == pitch).all()
-    assert np.allclose(pattern.diameter, FILL * pitch)
+    assert (pattern.wished == FILL * pitch).all()
+    # round a bend much tighter than the pitch two features may have to give way a little
+    assert len(pattern.shrunk) <= 2
 
     facing = region.base.area_vectors[places.triangle]
     assert np.allclose(np.linalg.norm(pattern.normal, axis=1), 1)
