@@ -48,9 +48,8 @@ class Linear(Graded):
     def share(self, surroundings: Surroundings) -> Field:
         """t is 0 at the start and 1 at the end."""
         if self.direction is None:
-            start, end = np.array(self.start), np.array(self.end)
-            along = end - start
-            along /= along @ along
+            start, end = (np.array(ends, dtype=np.float64) for ends in (self.start, self.end))
+            along = (end - start) / ((end - start) @ (end - start))
             low, high = float(start @ along), float(start @ along) + 1.0
         else:
             along = np.array(self.direction) / np.linalg.norm(self.direction)
