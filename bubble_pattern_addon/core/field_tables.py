@@ -183,6 +183,11 @@ def wanted(*described: Described) -> Wanted:
     )
 
 
+def asks_for_pitch(described: Described) -> bool:
+    """Whether a share of the pitch is part of this field."""
+    return any(isinstance(part, Fill) for part in _parts(described))
+
+
 def with_images(described: Described, names: Mapping[str, str]) -> Described:
     """The same field with its images called by other names."""
     changed = _with_images(described, names)

@@ -17,7 +17,7 @@ from typing import Any
 
 from .blending import Fill
 from .errors import RecipeError
-from .field_tables import field_from_toml, field_to_toml
+from .field_tables import asks_for_pitch, field_from_toml, field_to_toml
 from .metric import Constant, Described
 from .toml_values import (
     Point,
@@ -334,6 +334,8 @@ def check_recipe(recipe: Recipe) -> None:
     """
     packing, feature, limits = recipe.packing, recipe.feature, recipe.limits
     _check_length(packing.pitch, "[packing] pitch")
+    if asks_for_pitch(packing.pitch):
+        raise RecipeError("[packing] pitch is given as a share of itself: fill goes with diameters")
     _check_shaping(recipe.shaping)
     check_one_of(packing.integrator, INTEGRATORS, "[packing] integrator")
     check_at_least(packing.seed, 0, "[packing] seed")
@@ -448,7 +450,7 @@ def recipe_to_toml(recipe: Recipe) -> str:
 
 
 def _line(key: str, value: object) -> str:
-    if isinstance(value, Fill):
+    if key == "diameter" and isinstance(value, Fill):
         return f"fill = {field_to_toml(value.share)}"
     if isinstance(value, Described):
         return f"{key} = {field_to_toml(value)}"

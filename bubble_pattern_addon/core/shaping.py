@@ -71,6 +71,4 @@ def diameters(
     if not alone:
         return wished, ()
     features = "One feature is" if alone == 1 else f"{alone:,} features are"
-    return wished, (
-        f"{features} linked to no seed and keep the diameter that [shaping] gives without seeds.",
-    )
+    return wished, (f"{features} linked to no seed and as large as without seeds.",)
