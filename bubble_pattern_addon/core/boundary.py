@@ -49,12 +49,15 @@ def make_boundary(region: Region, spacing: float) -> Boundary | None:
 
 
 def signature(region: Region, points: Floats, row: Ints, reach: float) -> Floats:
-    """Coordinates (n, 7) in which places on different sheets are far apart although they touch in space.
+    """Coordinates, (n, 3) or (n, 7), in which places on sheets that face each other are far apart although
+    they touch in space. The first three are the points; more are there where the region has such sheets.
 
     points: (n, 3) on the triangles `row` (n,). Normals count with the length `reach`, so that both sides of a
     wall thinner than that are kept apart; parts of the region that are not connected are moved out of one
     another's sight.
     """
+    if region.single_sheet:
+        return points
     apart = 1e3 * (region.extent + reach) * region.sheet[row]
     return np.concatenate([points, reach * region.normals[row], apart[:, None]], axis=1)
 
@@ -64,9 +67,27 @@ def nearest_boundary(boundary: Boundary, points: Floats, row: Ints) -> tuple[Flo
 
     points: (n, 3) on the triangles `row` (n,)
     """
+    distance, foot, _ = _nearest_segment(boundary, points, row)
+    return distance, foot
+
+
+def inside_distance(boundary: Boundary, points: Floats, row: Ints) -> Floats:
+    """Distance (n,) to the nearest boundary segment, negative on its other side.
+
+    points: (n, 3) in the planes of the triangles `row` (n,) of a flat region, inside it or not
+    """
+    distance, foot, segment = _nearest_segment(boundary, points, row)
+    along = boundary.segments[segment, 1] - boundary.segments[segment, 0]
+    inward = np.cross(boundary.region.normals[row], along)
+    return np.copysign(distance, np.einsum("nc,nc->n", points - foot, inward))
+
+
+def _nearest_segment(boundary: Boundary, points: Floats, row: Ints) -> tuple[Floats, Floats, Ints]:
+    """Distance (n,), nearest point (n, 3) and number (n,) of the nearest boundary segment."""
     count = min(CANDIDATES, len(boundary.owner))
     _, near = boundary.tree.query(signature(boundary.region, points, row, boundary.reach), k=count)
-    ends = boundary.segments[boundary.owner[near.reshape(len(points), count)]]
+    segment = boundary.owner[near.reshape(len(points), count)]
+    ends = boundary.segments[segment]
     start, along = ends[..., 0, :], ends[..., 1, :] - ends[..., 0, :]
     offset = points[:, None] - start
     share = np.einsum("nkc,nkc->nk", offset, along) / np.maximum(
@@ -76,4 +97,4 @@ def nearest_boundary(boundary: Boundary, points: Floats, row: Ints) -> tuple[Flo
     distance = np.linalg.norm(points[:, None] - foot, axis=2)
     best = distance.argmin(axis=1)
     pick = np.arange(len(points))
-    return distance[pick, best], foot[pick, best]
+    return distance[pick, best], foot[pick, best], segment[pick, best]

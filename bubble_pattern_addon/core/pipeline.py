@@ -12,7 +12,6 @@ from .errors import RegionError
 from .links import Links, find_links
 from .mesh import Floats, Ints
 from .metric import Bound, Field, Places
-from .packing.bubbles import all_spots
 from .packing.pack import local_pitch, pack_steps
 from .pattern import Pattern
 from .progress import Progress, Steps
@@ -36,11 +35,10 @@ def pattern_steps(region: Region, recipe: Recipe, surroundings: Surroundings = N
     _check_lengths(region, metric, "pitch")
     ground, bubbles = yield from pack_steps(region, replace(recipe.packing, pitch=Bound(metric)))
     yield Progress("Shaping the features", 0.95)
-    spots = all_spots(ground, bubbles)
+    spots = bubbles.spots
     pitch = local_pitch(ground, bubbles)
     points = positions(ground.charts, spots)
     places = Places(points, region.triangles[spots.row], spots.barycentric)
-    first = len(bubbles.first_row.arc) + bubbles.held
     links = find_links(ground.charts, points, spots.row, pitch)
     normal = smooth_normals(region, spots)
     packed = Pattern(
@@ -49,7 +47,7 @@ def pattern_steps(region: Region, recipe: Recipe, surroundings: Surroundings = N
         tangent=_tangents(ground.charts, spots, points, links, normal),
         pitch=pitch,
         diameter=np.zeros(len(pitch)),
-        row=_rows(links, len(pitch), first),
+        row=_rows(links, len(pitch), bubbles.fixed),
     )
     return shaped(packed, links, region, recipe, surroundings)
 

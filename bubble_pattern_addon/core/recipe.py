@@ -65,7 +65,7 @@ class Packing:
     edge_offset: float = 0.0
     integrator: str = "fire"
     seed: int = 0
-    iterations: int = 120
+    iterations: int = 60
     tolerance: float = 1e-3
 
 

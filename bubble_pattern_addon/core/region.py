@@ -15,6 +15,8 @@ from .mesh import Bools, Floats, Ints, Mesh
 # A triangle is flat when its height is below this share of its longest edge: walking over it would divide by
 # zero.
 FLAT = 1e-12
+# Faces that turn by no more than this, in radians, lie in one plane: as much as single precision costs.
+LEVEL = 1e-4
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,12 @@ class Region:
         mean = self.area_vectors.sum(axis=0)
         length = np.linalg.norm(mean)
         return bool(self.sheet.max() == 0 and length > 0 and (self.normals @ mean).min() > 0.7 * length)
+
+    @cached_property
+    def flat(self) -> bool:
+        """Whether all triangles face the same way: each part of the region lies in a plane."""
+        away = self.normals - self.normals[0]
+        return bool(np.einsum("rc,rc->r", away, away).max() < LEVEL**2)
 
     @cached_property
     def boundary_segments(self) -> Floats:

@@ -58,7 +58,11 @@ def find_pairs(charts: Charts, points: Floats, row: Ints, pitch: Floats, skin: f
 
     points: (n, 3) positions; row: (n,) region rows; pitch: (n,)
     """
-    at, reach, widest = _search_space(charts, points, row, pitch), REACH + skin, float(pitch.max())
+    at, reach, widest = (
+        signature(charts.region, points, row, float(pitch.max())),
+        REACH + skin,
+        float(pitch.max()),
+    )
     tree = cKDTree(at, balanced_tree=False, compact_nodes=False)
     if widest < 1.25 * pitch.min():
         first, second = tree.query_pairs(reach * widest, output_type="ndarray").T
@@ -78,7 +82,7 @@ def renewed_pairs(
     moved = np.zeros(n, dtype=bool)
     moved[stale] = True
     kept = ~(moved[pairs.first] | moved[pairs.second])
-    at, reach = _search_space(charts, points, row, pitch), REACH + skin
+    at, reach = signature(charts.region, points, row, float(pitch.max())), REACH + skin
     tree = cKDTree(at, balanced_tree=False, compact_nodes=False)
     first, second = _nearest_pairs(tree, at, stale, pitch, reach)
     stable = (pitch[first] + pitch[second]) / 2
@@ -87,12 +91,6 @@ def renewed_pairs(
         np.concatenate([pairs.second[kept], second]),
         np.concatenate([pairs.stable[kept], stable]),
     )
-
-
-def _search_space(charts: Charts, points: Floats, row: Ints, pitch: Floats) -> Floats:
-    """Coordinates in which bubbles that feel each other are near, and those on facing sheets are not."""
-    region = charts.region
-    return points if region.single_sheet else signature(region, points, row, float(pitch.max()))
 
 
 def _nearest_pairs(tree: cKDTree, at: Floats, asked: Ints, pitch: Floats, reach: float) -> tuple[Ints, Ints]:

@@ -72,13 +72,13 @@ class _Crowd:
 
     def __init__(self, charts: Charts, reach: float) -> None:
         self.charts, self.reach = charts, reach
-        self.old = np.empty((0, 7))
+        self.old: list[Floats] = []
         self.old_tree: cKDTree | None = None
         self.recent: list[Floats] = []
         self.recent_tree: cKDTree | None = None
 
     def where(self, spots: Spots) -> Floats:
-        """Coordinates (n, 7) in which bubbles on facing sheets are far apart."""
+        """Coordinates in which bubbles on facing sheets are far apart, the points first."""
         return signature(self.charts.region, positions(self.charts, spots), spots.row, self.reach)
 
     def add(self, spots: Spots) -> None:
@@ -86,14 +86,14 @@ class _Crowd:
         if not len(spots.row):
             return
         self.recent.append(self.where(spots))
-        if len(self.recent) > RECENT and sum(map(len, self.recent)) > 0.3 * len(self.old):
-            self.old = np.concatenate([self.old, *self.recent[:-RECENT]])
-            self.old_tree = cKDTree(self.old, balanced_tree=False, compact_nodes=False)
+        if len(self.recent) > RECENT and sum(map(len, self.recent)) > 0.3 * sum(map(len, self.old)):
+            self.old = [np.concatenate([*self.old, *self.recent[:-RECENT]])]
+            self.old_tree = cKDTree(self.old[0], balanced_tree=False, compact_nodes=False)
             self.recent = self.recent[-RECENT:]
         self.recent_tree = cKDTree(np.concatenate(self.recent), balanced_tree=False, compact_nodes=False)
 
     def distance(self, at: Floats, within: float) -> Floats:
-        """Distance from each of `at` (n, 7) to the nearest bubble, infinite beyond `within`."""
+        """Distance from each of `at`, as of `where`, to the nearest bubble; infinite beyond `within`."""
         trees = [tree for tree in (self.old_tree, self.recent_tree) if tree is not None]
         found = [tree.query(at, distance_upper_bound=within)[0] for tree in trees]
         return np.min(found, axis=0)

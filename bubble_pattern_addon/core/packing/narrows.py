@@ -31,7 +31,7 @@ def in_the_narrows(ground: Ground, row: FirstRow) -> tuple[FirstRow, Spots]:
     nobody = Spots(np.empty(0, dtype=np.int64), np.empty((0, 3)))
     if not len(row.arc):
         return row, nobody
-    spots = spots_on_track(ground.charts, ground.track, row.wrapped())
+    spots = spots_on_track(ground.charts, ground.track, row.arc)
     aside = _to_the_middle(ground, row, spots)
     narrow = ~np.isnan(aside[:, 0])
     if not narrow.any():
@@ -46,7 +46,7 @@ def in_the_narrows(ground: Ground, row: FirstRow) -> tuple[FirstRow, Spots]:
     pitch = ground.pitch(middle)
     where = signature(ground.charts.region, positions(ground.charts, middle), middle.row, float(pitch.max()))
     kept = uncrowded(close_pairs(where, CLOSEST * pitch), np.arange(len(pitch)))
-    return _those(row, ~narrow), middle.take(kept)
+    return row.take(~narrow), middle.take(kept)
 
 
 def _keeps_clear(ground: Ground, spots: Spots) -> Bools:
@@ -57,14 +57,10 @@ def _keeps_clear(ground: Ground, spots: Spots) -> Bools:
     return distance > 0.499 * ground.pitch(spots) + ground.edge_offset
 
 
-def _those(row: FirstRow, which: Bools) -> FirstRow:
-    return FirstRow(*(values[which] for values in (row.arc, row.low, row.high, row.top, row.around)))
-
-
 def _to_the_middle(ground: Ground, row: FirstRow, spots: Spots) -> Floats:
     """Way (n, 3) from each bubble to the middle between both sides, nan where the place is not narrow."""
     track, charts = ground.track, ground.charts
-    points, _, knot = on_track(track, row.wrapped())
+    points, _, knot = on_track(track, row.arc)
     pitch = ground.pitch(spots)
     reach = float(pitch.max())
     tree = cKDTree(signature(charts.region, track.points, track.spots.row, reach))
@@ -103,7 +99,7 @@ def _directions(ground: Ground) -> Floats:
 def _apart(ground: Ground, row: FirstRow, knot: Ints, near: Ints) -> Floats:
     """Length of line (n, k), in pitches, between bubbles and knots; infinite between different lines."""
     track = ground.track
-    apart = np.abs(track.arc[near] - row.wrapped()[:, None])
+    apart = np.abs(track.arc[near] - row.arc[:, None])
     around = row.around[:, None]
     apart = np.where(around > 0, np.minimum(apart, np.abs(around - apart)), apart)
     return np.where(track.chain[near] == track.chain[knot][:, None], apart, np.inf)

@@ -7,17 +7,18 @@ import numpy as np
 from ..boundary import make_boundary, nearest_boundary, signature
 from ..errors import RegionError
 from ..mesh import Floats
-from ..metric import Field, Places
+from ..metric import Constant, Field, Places
 from ..progress import Progress, Steps
 from ..recipe import Packing
 from ..region import Region
 from ..surface import Charts, Complex, Spots, make_charts, positions, to_frame, walk
-from .bubbles import Bubbles, Ground, all_spots
+from .bubbles import Bubbles, Ground, joined
 from .crowding import close_pairs, uncrowded
 from .direction import smooth_directions
 from .force import STIFFNESS, stiff_law
 from .lattice import grow
 from .narrows import in_the_narrows
+from .plane import fills_its_box, lay
 from .population import control
 from .relax import relax
 from .rim import (
@@ -42,7 +43,7 @@ LONG_ENOUGH = 6.0
 TOO_CLOSE = 0.8
 # Rounds of relaxation and population control, and how many steps each may take; the last phases' steps.
 ROUNDS = 3
-STIFF_STEPS = 60
+STIFF_STEPS = 45
 
 
 def pack_steps(region: Region, packing: Packing) -> Steps[tuple[Ground, Bubbles]]:
@@ -51,12 +52,13 @@ def pack_steps(region: Region, packing: Packing) -> Steps[tuple[Ground, Bubbles]
     charts = make_charts(region)
     pitch = _pitch_over(region, packing.pitch)
     _check_count(region, pitch)
-    ground = _ground(charts, pitch, packing.edge_offset)
-    row, held = in_the_narrows(ground, _without_conflicts(ground, first_row(ground.track)))
+    uniform = packing.pitch.value if isinstance(packing.pitch, Constant) else None
+    ground = _ground(charts, pitch, uniform, packing.edge_offset)
+    along, between = in_the_narrows(ground, _without_conflicts(ground, first_row(ground.track)))
+    first = spots_on_track(charts, ground.track, along.arc) if len(along.arc) else _nobody()
     yield Progress("Growing the lattice", 0.1)
-    free = _lattice(ground, row, packing.seed)
-    free = Spots(np.concatenate([held.row, free.row]), np.concatenate([held.barycentric, free.barycentric]))
-    bubbles = Bubbles(row, free, len(held.row))
+    fixed = joined(first, between)
+    bubbles = Bubbles(joined(fixed, _lattice(ground, packing.seed)), len(fixed.row))
     if not len(bubbles):
         raise RegionError(
             "No bubble fits into the target region: it is narrower than one pitch everywhere; use a smaller "
@@ -78,7 +80,7 @@ def pack_steps(region: Region, packing: Packing) -> Steps[tuple[Ground, Bubbles]
 
 def local_pitch(ground: Ground, bubbles: Bubbles) -> Floats:
     """Packing metric at the bubbles, (n,)."""
-    return ground.pitch(all_spots(ground, bubbles))
+    return ground.pitch(bubbles.spots)
 
 
 def _pitch_over(region: Region, field: Field) -> Lengths:
@@ -105,7 +107,7 @@ def _check_count(region: Region, pitch: Lengths) -> None:
         )
 
 
-def _ground(charts: Charts, pitch: Lengths, edge_offset: float) -> Ground:
+def _ground(charts: Charts, pitch: Lengths, uniform: float | None, edge_offset: float) -> Ground:
     rim = charts.region.rim
     if not len(rim):
         nothing = np.empty(0)
@@ -113,11 +115,16 @@ def _ground(charts: Charts, pitch: Lengths, edge_offset: float) -> Ground:
         track = Track(
             empty, np.empty((0, 3)), nothing, empty.row, empty.row.astype(bool), nothing.astype(bool)
         )
-        return Ground(charts, None, track, pitch, edge_offset)
+        return Ground(charts, None, track, pitch, uniform, edge_offset)
     finest = float(pitch(Spots(rim[:, 0], np.full((len(rim), 3), 1 / 3))).min())
     boundary = make_boundary(charts.region, finest / 8)
     assert boundary is not None
-    return Ground(charts, boundary, inset_track(charts, boundary, pitch, edge_offset), pitch, edge_offset)
+    track = inset_track(charts, boundary, pitch, edge_offset)
+    return Ground(charts, boundary, track, pitch, uniform, edge_offset)
+
+
+def _nobody() -> Spots:
+    return Spots(np.empty(0, dtype=np.int64), np.empty((0, 3)))
 
 
 def _where(charts: Charts, spots: Spots, reach: float) -> Floats:
@@ -128,27 +135,35 @@ def _without_conflicts(ground: Ground, row: FirstRow) -> FirstRow:
     """The first row less those too close, as across a neck or in an acute corner; corners go last."""
     if not len(row.arc):
         return row
-    spots = spots_on_track(ground.charts, ground.track, row.wrapped())
+    spots = spots_on_track(ground.charts, ground.track, row.arc)
     local = ground.pitch(spots)
     pairs = close_pairs(_where(ground.charts, spots, float(local.max())), TOO_CLOSE * local)
-    rank = np.lexsort((np.arange(len(local)), row.high > row.low)).argsort()
-    kept = uncrowded(pairs, rank)
-    return FirstRow(*(values[kept] for values in (row.arc, row.low, row.high, row.top, row.around)))
+    rank = np.lexsort((np.arange(len(local)), ~row.corner)).argsort()
+    return row.take(uncrowded(pairs, rank))
 
 
-def _lattice(ground: Ground, row: FirstRow, seed: int) -> Spots:
+def _lattice(ground: Ground, seed: int) -> Spots:
     """Bubbles of a lattice that fills what the first row leaves free."""
     charts = ground.charts
     seeds, directions = _seeds(ground, seed)
+    uniform = ground.uniform if charts.region.flat else None
+    if uniform is not None and ground.boundary is not None and fills_its_box(charts, uniform):
+        clear = CLEAR_OF_RIM * uniform + ground.edge_offset
+        return lay(charts, ground.boundary, uniform, clear, seeds, directions)
     closed = np.bincount(charts.region.sheet[charts.region.rim[:, 0]], minlength=len(seeds.row)) == 0
     field = smooth_directions(charts, closed[charts.region.sheet]) if closed.any() else None
     if field is not None:
         directions = np.where(closed, field[seeds.row] ** (1 / 6), directions)
     spots, _ = grow(charts, ground.pitch, seeds, directions, MOST, field)
+    return _clear_of_rim(ground, spots)
+
+
+def _clear_of_rim(ground: Ground, spots: Spots) -> Spots:
+    """The lattice less what would be in the first row's way."""
     if ground.boundary is None:
         return spots
     local = ground.pitch(spots)
-    distance, _ = nearest_boundary(ground.boundary, positions(charts, spots), spots.row)
+    distance, _ = nearest_boundary(ground.boundary, positions(ground.charts, spots), spots.row)
     return spots.take(distance > CLEAR_OF_RIM * local + ground.edge_offset)
 
 

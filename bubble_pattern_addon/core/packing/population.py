@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from ..boundary import nearest_boundary, signature
 from ..mesh import Bools, Floats, Ints
 from ..surface import Charts, Spots, positions, to_frame, walk
-from .bubbles import Bubbles, Ground, points_and_rows
+from .bubbles import Bubbles, Ground, joined
 from .crowding import close_pairs, uncrowded
 from .force import Pairs, find_pairs
 
@@ -38,22 +38,19 @@ def overlap_ratio(pairs: Pairs, distance: Floats, pitch: Floats) -> Floats:
 
 def control(ground: Ground, bubbles: Bubbles, pitch: Floats) -> tuple[Bubbles, int]:
     """Bubbles without the too crowded ones and with new ones in the voids; and how many came or went."""
-    points, row, _ = points_and_rows(ground, bubbles)
+    points, row, m = positions(ground.charts, bubbles.spots), bubbles.spots.row, bubbles.fixed
     pairs = find_pairs(ground.charts, points, row, pitch, 0.0)
     distance = np.linalg.norm(points[pairs.first] - points[pairs.second], axis=1)
     ratio = overlap_ratio(pairs, distance, pitch)
-    m = len(bubbles.first_row.arc)
-    gone = _pressed_out(ground, points[m:], row[m:], pitch[m:]) | _too_crowded(pairs, distance, ratio, m)
-    gone[: bubbles.held] = False
+    gone = np.zeros(len(bubbles), dtype=bool)
+    gone[m:] = pressed_out(ground, points[m:], row[m:], pitch[m:]) | _too_crowded(pairs, distance, ratio, m)
     added = _voids(ground, points, row, pitch, np.flatnonzero(ratio < LONELY))
     if not gone.any() and not len(added.row):
         return bubbles, 0
-    stay = bubbles.free.take(~gone)
-    free = Spots(np.concatenate([stay.row, added.row]), np.concatenate([stay.barycentric, added.barycentric]))
-    return Bubbles(bubbles.first_row, free, bubbles.held), int(gone.sum()) + len(added.row)
+    return Bubbles(joined(bubbles.spots.take(~gone), added), m), int(gone.sum()) + len(added.row)
 
 
-def _pressed_out(ground: Ground, points: Floats, row: Ints, pitch: Floats) -> Bools:
+def pressed_out(ground: Ground, points: Floats, row: Ints, pitch: Floats) -> Bools:
     """Free bubbles between the first row and the boundary."""
     if ground.boundary is None or not len(points):
         return np.zeros(len(points), dtype=bool)

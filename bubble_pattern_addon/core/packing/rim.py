@@ -46,23 +46,17 @@ class Track:
 
 @dataclass(frozen=True)
 class FirstRow:
-    """Bubbles on the track: arc (n,) where they are; low, high (n,) how far they may slide (equal for a
-    corner's); top, around (n,): where a line that closes on itself ends and how long it is, infinite and 0
-    for an open one.
+    """Bubbles on the track: arc (n,) where they are; corner (n,) whether one stands at a sharp corner; around
+    (n,): the length of its line where that closes on itself, 0 for an open one.
     """
 
     arc: Floats
-    low: Floats
-    high: Floats
-    top: Floats
+    corner: Bools
     around: Floats
 
-    def wrapped(self) -> Floats:
-        """The arcs brought back onto their lines, (n,): a bubble may have slid past a closed one's end."""
-        closed = self.around > 0
-        top = np.where(closed, self.top, self.arc)
-        beyond = np.floor((top - self.arc) / np.where(closed, self.around, 1.0))
-        return self.arc + beyond * self.around
+    def take(self, which: Bools) -> FirstRow:
+        """The bubbles `which`."""
+        return FirstRow(self.arc[which], self.corner[which], self.around[which])
 
 
 def inset_track(charts: Charts, boundary: Boundary, pitch: Lengths, edge_offset: float) -> Track:
@@ -325,31 +319,28 @@ def first_row(track: Track) -> FirstRow:
     """Bubbles of the first row: one at every sharp corner, the others evenly spaced between (in local
     pitches).
     """
-    parts: list[Floats] = []
+    parts: list[FirstRow] = []
     for number, closed in enumerate(track.closed):
         knots = np.flatnonzero(track.chain == number)
         low, high = track.arc[knots[0]], track.arc[knots[-1]]
-        fixed = track.arc[knots[track.sharp[knots]]]
-        top, around = (high, high - low) if closed else (np.inf, 0.0)
-        if closed and not len(fixed):
-            count = _count(high - low)
-            arc = low + (high - low) * np.arange(count) / count
-            parts.append(np.stack([arc, *np.broadcast_arrays(-np.inf, np.inf, top, around, arc)[:4]]))
-            continue
-        ends = np.append(fixed, fixed[0] + high - low) if closed else fixed
-        for start, stop in pairwise(ends):
+        corners = track.arc[knots[track.sharp[knots]]]
+        around = high - low if closed else 0.0
+        ends = np.append(corners, corners[0] + around) if closed and len(corners) else corners
+        stretches = list(pairwise(ends)) if len(ends) else [(low, high)]
+        for start, stop in stretches:
             count = _count(stop - start)
             arc = start + (stop - start) * np.arange(count) / count
-            corner = np.arange(count) == 0
-            parts.append(
-                np.stack(
-                    [arc, np.where(corner, arc, start), np.where(corner, arc, stop)]
-                    + [np.full(count, value) for value in (top, around)]
-                )
-            )
+            corner = (np.arange(count) == 0) & bool(len(ends))
+            parts.append(FirstRow(np.where(arc > high, arc - around, arc), corner, np.full(count, around)))
         if not closed:
-            parts.append(np.array([[ends[-1]], [ends[-1]], [ends[-1]], [top], [around]]))
-    return FirstRow(*np.concatenate(parts, axis=1)) if parts else FirstRow(*np.empty((5, 0)))
+            parts.append(FirstRow(ends[-1:], np.ones(1, dtype=bool), np.zeros(1)))
+    if not parts:
+        return FirstRow(np.empty(0), np.empty(0, dtype=bool), np.empty(0))
+    return FirstRow(
+        np.concatenate([part.arc for part in parts]),
+        np.concatenate([part.corner for part in parts]),
+        np.concatenate([part.around for part in parts]),
+    )
 
 
 def _count(length: float) -> int:
