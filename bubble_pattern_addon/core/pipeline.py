@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import dijkstra
 from .errors import RegionError
 from .links import Links, find_links
 from .mesh import Floats, Ints
-from .metric import Bound, Field, Places
+from .metric import Bound, Constant, Field, Places
 from .packing.pack import local_pitch, pack_steps
 from .pattern import Pattern
 from .progress import Progress, Steps
@@ -33,7 +33,9 @@ def pattern_steps(region: Region, recipe: Recipe, surroundings: Surroundings = N
     surroundings = replace(surroundings, region=region)
     metric = bound(recipe.packing.pitch, surroundings, "[packing] pitch")
     _check_lengths(region, metric, "pitch")
-    ground, bubbles = yield from pack_steps(region, replace(recipe.packing, pitch=Bound(metric)))
+    # a number stays one: there are quick ways to pack with the same pitch everywhere
+    pitch_there = metric if isinstance(metric, Constant) else Bound(metric)
+    ground, bubbles = yield from pack_steps(region, replace(recipe.packing, pitch=pitch_there))
     yield Progress("Shaping the features", 0.95)
     spots = bubbles.spots
     pitch = local_pitch(ground, bubbles)

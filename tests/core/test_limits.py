@@ -9,13 +9,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bubble_pattern_addon.core import pipeline
 from bubble_pattern_addon.core.blending import Blend, Fill, Most, Product
 from bubble_pattern_addon.core.distance import boundary_distance
 from bubble_pattern_addon.core.errors import FieldError, RecipeError, RegionError
 from bubble_pattern_addon.core.fields import Distance, Edge, Linear, Radial
 from bubble_pattern_addon.core.limits import LEAST_WEB, limited, within_limits
 from bubble_pattern_addon.core.mesh import Floats
-from bubble_pattern_addon.core.metric import Constant, Described, Places
+from bubble_pattern_addon.core.metric import Bound, Constant, Described, Places
+from bubble_pattern_addon.core.packing.pack import pack_steps
 from bubble_pattern_addon.core.painted import Attribute
 from bubble_pattern_addon.core.pattern import Pattern, all_bubbles
 from bubble_pattern_addon.core.pipeline import pattern_steps
@@ -288,3 +290,20 @@ def test_what_a_field_lacks_is_told_with_the_recipe_s_key() -> None:
         drive(pattern_steps(TRAPEZOID, Recipe(packing=Packing(pitch=field))))
     with pytest.raises(FieldError, match=r"^\[shaping\] diameter: name = "):
         drive(pattern_steps(TRAPEZOID, Recipe(packing=PACKING, shaping=Shaping(diameter=field))))
+
+
+def test_a_number_reaches_the_packing_as_one_a_field_bound(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = []
+
+    def watch(region: Region, packing: Packing):
+        seen.append(packing.pitch)
+        return pack_steps(region, packing)
+
+    monkeypatch.setattr(pipeline, "pack_steps", watch)
+    drive(pattern_steps(TRAPEZOID, Recipe(packing=PACKING)))
+    # a product of numbers is packed as any other field, to the same end
+    pitch = Product(of=(Constant(2.5), Constant(2.0)))
+    drive(pattern_steps(TRAPEZOID, Recipe(packing=replace(PACKING, pitch=pitch))))
+    assert seen[0] is PACKING.pitch
+    assert isinstance(seen[1], Bound)
+    assert (seen[1](BUBBLES.places) == 5.0).all()
