@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from .mesh import Floats
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 
 @dataclass(frozen=True)
@@ -24,6 +27,8 @@ class Segments:
 
 def index_segments(segments: Floats) -> Segments:
     """Index of `segments` (S, 2, 3), at least one; a segment may be a point."""
+    from scipy.spatial import cKDTree  # here, so that a recipe can be read without scipy
+
     pieces = _short_pieces(segments)
     half = float(np.linalg.norm(pieces[:, 1] - pieces[:, 0], axis=1).max()) / 2
     return Segments(pieces, cKDTree(pieces.mean(axis=1)), half)

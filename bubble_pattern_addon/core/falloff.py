@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from .errors import RecipeError
 from .mesh import Floats
@@ -105,6 +104,8 @@ class Graded(Described):
 
 
 def _through(curve: tuple[tuple[float, float], ...]) -> Shape:
+    from scipy.interpolate import PchipInterpolator  # here, so that a recipe can be read without scipy
+
     t, height = np.array(curve).T
     between = PchipInterpolator(t, height)
     return lambda share: between(np.clip(share, t[0], t[-1]))

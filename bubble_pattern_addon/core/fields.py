@@ -6,6 +6,7 @@ All distances are straight ones, as a designer reads them off a drawing.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,9 +15,11 @@ from .errors import FieldError, RecipeError
 from .falloff import Graded
 from .mesh import Bools, Floats, Ints
 from .metric import Field, Places
-from .region import Region
 from .surroundings import Surroundings, Thing
 from .toml_values import Point, check_above, check_at_least, check_one_of
+
+if TYPE_CHECKING:
+    from .region import Region
 
 LOOPS = ("all", "outer", "islands")
 AXES = ("x", "y", "z")

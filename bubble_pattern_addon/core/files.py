@@ -41,9 +41,9 @@ class LoadedBase:
     mesh: Mesh
     attributes: Mapping[str, Bools] = field(default_factory=dict)
     materials: Mapping[str, Bools] = field(default_factory=dict)
-    values: Mapping[str, Floats] = field(default_factory=dict)
-    uv_maps: Mapping[str, Floats] = field(default_factory=dict)
-    objects: Mapping[str, Thing] = field(default_factory=dict)
+    values: Mapping[str, Floats] = field(default_factory=dict, kw_only=True)
+    uv_maps: Mapping[str, Floats] = field(default_factory=dict, kw_only=True)
+    objects: Mapping[str, Thing] = field(default_factory=dict, kw_only=True)
 
 
 # -- in ------------------------------------------------------------------------------------------------------
@@ -78,7 +78,7 @@ def load_base(path: Path) -> LoadedBase:
     values = _laid_end_to_end([piece.values for piece in pieces], pieces)
     masks = {name: column != 0 for name, column in values.items() if column.ndim == 1}
     uv_maps = _laid_end_to_end([piece.uv_maps for piece in pieces], pieces)
-    return LoadedBase(weld(mesh), masks, materials, values, uv_maps)
+    return LoadedBase(weld(mesh), masks, materials, values=values, uv_maps=uv_maps)
 
 
 def _read(path: Path) -> list[Piece]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,9 +11,11 @@ from .errors import FieldError, RecipeError
 from .falloff import Graded
 from .mesh import Floats
 from .metric import Field, Places
-from .region import Region
 from .surroundings import Surroundings
 from .toml_values import Point, check_above, check_finite, check_one_of
+
+if TYPE_CHECKING:
+    from .region import Region
 
 CHANNELS = ("light", "red", "green", "blue", "alpha")
 # how light red, green and blue are (ITU-R BT.709)

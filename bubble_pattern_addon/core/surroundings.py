@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from .errors import FieldError
 from .mesh import Bools, Floats
 from .metric import Field
-from .region import Region
 from .toml_values import nearest, show
+
+if TYPE_CHECKING:
+    from .region import Region
 
 Entry = TypeVar("Entry")
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import tomllib
 from dataclasses import fields
+from pathlib import Path
 
 import pytest
 from hypothesis import assume, given, settings
@@ -33,6 +36,7 @@ from bubble_pattern_addon.core.recipe import (
     recipe_to_toml,
 )
 
+ROOT = Path(__file__).resolve().parents[2]
 lengths = st.floats(1e-3, 1e3)
 numbers = st.floats(-1e6, 1e6)
 points = st.tuples(numbers, numbers, numbers)
@@ -308,3 +312,12 @@ def test_what_fields_ask_for_is_known_before_they_are_bound() -> None:
     renamed = with_images(field, {"a.png": "c.png"})
     assert wanted(renamed).images == {"b.png", "c.png"}
     assert with_images(renamed, {"c.png": "a.png"}) == field
+
+
+def test_recipes_are_read_without_scipy() -> None:
+    """Blender registers the panel's settings, which know recipes, at every start."""
+    program = "import sys, bubble_pattern_addon.core.recipe; print('scipy' in sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "False"
