@@ -41,7 +41,7 @@ def limited(bubbles: Pattern, region: Region, limits: Limits) -> Pattern:
     """
     wished = bubbles.diameter
     diameter, kept = within_limits(bubbles, region, limits)
-    return split(replace(bubbles, diameter=diameter, wished=wished), kept)
+    return split(replace(bubbles, diameter=np.where(kept, diameter, 0.0), wished=wished), kept)
 
 
 def within_limits(bubbles: Pattern, region: Region, limits: Limits) -> tuple[Floats, Bools]:

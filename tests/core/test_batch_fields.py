@@ -142,20 +142,31 @@ def test_colours_and_uv_maps_of_files_are_read_at_the_corners(tmp_path: Path) ->
     assert np.allclose(base.values[COLOUR], colours[body.faces] / 255)
     (tmp_path / "coloured.glb").write_bytes(body.export(file_type="glb"))
     assert np.allclose(load_base(tmp_path / "coloured.glb").values[COLOUR], colours[body.faces] / 255)
-    uv = body.vertices[:, :2] / [60, 40] + 0.5
-    body.visual = trimesh.visual.TextureVisuals(uv=uv)
-    for suffix in ("obj", "glb"):
-        content = body.export(file_type=suffix)
-        content = content.encode() if isinstance(content, str) else content
-        (tmp_path / f"mapped.{suffix}").write_bytes(content)
-        base = load_base(tmp_path / f"mapped.{suffix}")
-        wanted = base.mesh.corners[:, :, :2] / [60, 40] + 0.5
-        assert np.allclose(base.uv_maps[UV_MAP], wanted, atol=1e-5)
+    lines = [f"v {x} {y} {z}\nvt {x / 60 + 0.5} {y / 40 + 0.5}" for x, y, z in body.vertices]
+    lines += [f"f {a}/{a} {b}/{b} {c}/{c}" for a, b, c in body.faces + 1]
+    (tmp_path / "mapped.obj").write_text("\n".join(lines))
+    check_mapped(tmp_path / "mapped.obj")
+
+
+def check_mapped(path: Path) -> None:
+    base = load_base(path)
+    wanted = base.mesh.corners[:, :, :2] / [60, 40] + 0.5
+    assert np.allclose(base.uv_maps[UV_MAP], wanted, atol=1e-5)
+
+
+def test_uv_maps_of_gltf_stand_upright(tmp_path: Path) -> None:
+    pytest.importorskip("PIL")  # without it trimesh writes no texture, which it needs to write a UV map
+    body = fine_plate()
+    body.visual = trimesh.visual.TextureVisuals(uv=body.vertices[:, :2] / [60, 40] + 0.5)
+    (tmp_path / "mapped.glb").write_bytes(body.export(file_type="glb"))
+    check_mapped(tmp_path / "mapped.glb")
 
 
 def test_a_mirrored_piece_keeps_its_paint_and_a_bare_one_has_none(tmp_path: Path) -> None:
     body = fine_plate()
-    body.visual = trimesh.visual.TextureVisuals(uv=body.vertices[:, :2] / [60, 40] + 0.5)
+    colours = np.full((len(body.vertices), 4), 255, dtype=np.uint8)
+    colours[:, 0] = np.round(body.vertices[:, 0] + 30) * 4
+    body.visual = trimesh.visual.ColorVisuals(body, vertex_colors=colours)
     mirror = np.diag([-1.0, 1, 1, 1])
     mirror[:3, 3] = (100, 0, 0)
     scene = trimesh.Scene()
@@ -163,12 +174,11 @@ def test_a_mirrored_piece_keeps_its_paint_and_a_bare_one_has_none(tmp_path: Path
     scene.add_geometry(trimesh.creation.box((10, 10, 10)))
     (tmp_path / "both.glb").write_bytes(scene.export(file_type="glb"))
     base = load_base(tmp_path / "both.glb")
-    uv = base.uv_maps[UV_MAP]
-    bare = np.isnan(uv).all(axis=(1, 2))
+    red = base.values[COLOUR][..., 0]
+    bare = np.isnan(red).all(axis=1)
     assert bare.sum() == 12
-    corners = base.mesh.corners[~bare]
-    wanted = np.stack([(100 - corners[..., 0]) / 60 + 0.5, corners[..., 1] / 40 + 0.5], axis=2)
-    assert np.allclose(uv[~bare], wanted, atol=1e-5)
+    wanted = (130 - base.mesh.corners[~bare][..., 0]) * 4 / 255
+    assert np.allclose(red[~bare], wanted, atol=4.1 / 255)
 
 
 HALFTONE = (

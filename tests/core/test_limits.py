@@ -256,6 +256,22 @@ def test_shrunk_features_are_those_that_are_smaller_than_they_should_be() -> Non
     assert np.array_equal(pattern.diameter[rest], pattern.wished[rest])
 
 
+@pytest.mark.parametrize("name", ["panel", "capsule", "thin-wall", "parts"])
+def test_the_limits_hold_on_curved_and_facing_surfaces(name: str) -> None:
+    shape = SHAPES[name]()
+    region, pitch = region_of(name), 2 * shape.pitch
+    size = Linear(from_=0.3 * pitch, to=1.6 * pitch, direction=(1.0, 2.0, 0.5))
+    limits = Limits(min_web=0.3 * pitch, min_margin=0.2 * pitch, min_diameter=0.4 * pitch)
+    packing = Packing(pitch=Constant(pitch), iterations=20)
+    pattern = drive(pattern_steps(region, Recipe(packing=packing, shaping=Shaping(size), limits=limits)))
+    assert min_web(pattern) >= limits.min_web
+    assert min_margin(pattern, region) >= limits.min_margin
+    assert pattern.diameter.min() >= limits.min_diameter
+    assert len(pattern.shrunk) > 0
+    assert pattern.dropped is not None
+    assert (pattern.dropped.diameter == 0).all()
+
+
 def test_seeds_give_way_to_the_limits_too() -> None:
     seeds = (Seed((-40.0, -20.0, 0.0), 20.0), Seed((38.0, -30.0, 0.0), 2.0))
     pattern = drive(pattern_steps(TRAPEZOID, Recipe(packing=PACKING, shaping=Shaping(seeds=seeds))))
