@@ -12,10 +12,11 @@ import shutil
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
-from typing import IO, Any, NoReturn, Protocol, cast
+from typing import Any, NoReturn, Protocol, cast
 
 import numpy as np
 
@@ -30,10 +31,12 @@ from .core.progress import Progress, Steps, drive, within
 from .core.recipe import Recipe, default_recipe, load_recipe, recipe_to_toml
 from .core.region import Region, make_region
 from .core.selection import select
+from .core.sides import check_one_side
 from .core.solid import Part, part_steps
 from .core.soundness import sound_base
 from .core.surroundings import Surroundings
 from .pixels import read_image
+from .terminal import line_on, silenced
 
 EXAMPLE = """\
 example of a recipe:
@@ -95,13 +98,12 @@ def run_steps(base: LoadedBase, recipe_file: Path) -> Steps[Run]:
     yield Progress("Reading the region", 0.0)
     selected = select(base.mesh, load_recipe(recipe_file).region, base.attributes, base.materials)
     region = make_region(base.mesh, selected)
-    segments = region.boundary_segments
-    perimeter = float(np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1).sum())
-    recipe = load_recipe(recipe_file, default_recipe(region.area, perimeter))
+    recipe = load_recipe(recipe_file, default_recipe(region.area, region.perimeter))
+    if recipe.feature.depth is None:
+        check_one_side(base.mesh, selected)
     sound_base(base.mesh)  # step 3 looks again; but nobody shall wait for a packing to be told of a hole
+    surroundings = surroundings_of(base, read_images(recipe, recipe_file.parent))
     clock.stop("region")
-    images = read_images(recipe, recipe_file.parent)
-    surroundings = surroundings_of(base, images)
     pattern = yield from clock.timed(within(pattern_steps(region, recipe, surroundings), 0.0, 0.5))
     part = yield from within(part_steps(base.mesh, pattern, recipe.feature), 0.5, 1.0)
     clock.stop("add")
@@ -257,12 +259,15 @@ def main(
     except SystemExit as end:  # --help or a wrong command line: said already
         return int(end.code or 0)
     show = None if options.quiet else report or line_on(sys.stderr)
+    hushed = silenced if options.quiet else nullcontext  # Blender tells of every file it reads and saves
     try:
         load_recipe(options.recipe)  # nonsense is told before a long read
-        base = read_base(options.base, in_blender)
+        with hushed():
+            base = read_base(options.base, in_blender)
         with output_folder(options.out) as folder:
             run = drive(run_steps(base, options.recipe), show)
-            write_run(run, folder, blender_side)
+            with hushed():
+                write_run(run, folder, blender_side)
     except PatternError as error:
         return _failed(prog, str(error), show)
     except MemoryError:
@@ -292,20 +297,3 @@ def summary(run: Run, out: Path) -> str:
         f"{figures['features']:,} holes, {100 * figures['open_area']:.1f} % open{webs}{cut}; "
         f"watertight part in {out / 'part.stl'}"
     )
-
-
-def line_on(stream: IO[str]) -> Callable[[Progress], None]:
-    """A reporter that keeps one line of `stream` up to date; where that is no terminal, a line per stage."""
-    said = ""
-    terminal = stream.isatty()
-
-    def show(progress: Progress) -> None:
-        nonlocal said
-        if terminal:
-            text = "" if progress.stage == "Done" else f"{progress.stage} {100 * progress.fraction:.0f} %"
-            print(f"\r{text:<60}", end="\r" if not text else "", file=stream, flush=True)
-        elif progress.stage not in (said, "Done"):
-            print(f"{progress.stage} ...", file=stream, flush=True)
-        said = progress.stage
-
-    return show

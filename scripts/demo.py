@@ -17,11 +17,10 @@ target region marked, and runs the batch on it. DIR (default: out/demo) then hol
 from __future__ import annotations
 
 import argparse
-import contextlib
 import os
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,8 +28,10 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from scripts import environment  # noqa: E402
+from scripts.progress_bar import progress_bar  # noqa: E402
 
 if TYPE_CHECKING:
+    from bubble_pattern_addon.core.progress import Progress
     from scripts.door_panel import DoorPanel
 
 RECIPE = """\
@@ -76,11 +77,10 @@ def write_base(path: Path, panel: DoorPanel) -> None:
     import bpy
     import numpy as np
 
+    from bubble_pattern_addon.blender.batch_base import new_file_in_millimeters
     from bubble_pattern_addon.blender.picture import make_material
 
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    units = bpy.context.scene.unit_settings
-    units.system, units.scale_length, units.length_unit = 'METRIC', 0.001, 'MILLIMETERS'
+    new_file_in_millimeters()
     mesh = bpy.data.meshes.new("Door panel")
     mesh.from_pydata(panel.mesh.vertices.tolist(), [], panel.mesh.triangles.tolist())
     mesh.shade_smooth()
@@ -101,53 +101,25 @@ def write_base(path: Path, panel: DoorPanel) -> None:
     bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True)
 
 
-def shown() -> Any:
-    """A progress bar that follows the batch run, and the samples of the rendering."""
+def shown() -> Callable[[Progress], None]:
+    """A reporter that follows the batch run, and the samples of the rendering."""
     import re
 
     import bpy
-    from tqdm import tqdm
 
-    from bubble_pattern_addon.batch import line_on
+    from bubble_pattern_addon.core.progress import Progress
+    from bubble_pattern_addon.terminal import line_on
 
-    if not sys.stderr.isatty():
-        return line_on(sys.stderr)
-    bar = tqdm(total=100, leave=False, bar_format="{desc:<24}{percentage:3.0f}% |{bar}| {elapsed}")
-
-    def show(progress: Any) -> None:
-        if progress.stage == "Done":
-            bar.close()
-            return
-        bar.set_description_str(progress.stage, refresh=False)
-        bar.n = round(100 * progress.fraction)
-        bar.refresh()
+    show = progress_bar() or line_on(sys.stderr)
 
     @bpy.app.handlers.persistent  # it shall outlive the files that are opened
     def rendering(stats: Any, *_: Any) -> None:
         sample = re.search(r"Sample (\d+)/(\d+)", str(stats))
         if sample:
-            bar.set_description_str("Rendering", refresh=False)
-            bar.n = round(100 * int(sample[1]) / int(sample[2]))
-            bar.refresh()
+            show(Progress("Rendering", int(sample[1]) / int(sample[2])))
 
     bpy.app.handlers.render_stats.append(rendering)
     return show
-
-
-@contextlib.contextmanager
-def quiet() -> Iterator[None]:
-    """Swallow what Blender itself says on standard output, of every file read and every tile rendered."""
-    sys.stdout.flush()
-    kept = os.dup(1)
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nowhere, 1)
-        yield
-    finally:
-        sys.stdout.flush()
-        os.dup2(kept, 1)
-        os.close(kept)
-        os.close(nowhere)
 
 
 def main() -> int:
@@ -164,6 +136,7 @@ def make(options: argparse.Namespace) -> int:
     """The demo itself, inside the environment."""
     from bubble_pattern_addon import batch
     from bubble_pattern_addon.core.progress import Progress
+    from bubble_pattern_addon.terminal import silenced
     from scripts.door_panel import make_door_panel
 
     out: Path = options.out.resolve()
@@ -180,11 +153,11 @@ def make(options: argparse.Namespace) -> int:
             ),
             encoding="utf-8",
         )
-        with quiet():
+        with silenced():
             write_base(out / "door_panel.blend", make_door_panel())
     except OSError as error:
         sys.exit(f"demo.py: {out} can't be written ({error.strerror}): give another folder with --out")
-    with quiet():
+    with silenced():
         code = batch.main(
             [str(recipe), "--base", str(out / "door_panel.blend"), "--out", str(out)], "demo.py", show
         )

@@ -7,16 +7,13 @@ circles round the island, so that the mesh follows them; lengths in millimetres.
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from scipy.spatial import Delaunay, cKDTree
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
 from bubble_pattern_addon.core.mesh import Bools, Floats, Ints, Mesh
+from scripts.shapes import doubled_areas
 
 THICKNESS = 2.5
 CORNERS = np.array([[-84.0, -50.0], [78.0, -46.0], [88.0, 38.0], [-62.0, 52.0]])
@@ -135,8 +132,7 @@ def _fill(line: Floats, normal: Floats) -> Floats:
 
 
 def _counter_clockwise(flat: Floats, triangles: Ints) -> Ints:
-    a, b, c = flat[triangles].swapaxes(0, 1)
-    turned = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
+    turned = doubled_areas(flat, triangles) < 0
     triangles[turned] = triangles[turned][:, ::-1]
     return triangles
 

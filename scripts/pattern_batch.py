@@ -11,7 +11,6 @@ environment beside this folder, made with Blender's own Python on first use.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -20,6 +19,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from scripts import environment  # noqa: E402
+from scripts.progress_bar import progress_bar  # noqa: E402
 
 LIBRARIES = ("numpy", "scipy", "trimesh", "manifold3d")
 
@@ -74,25 +74,6 @@ def _has_image(value: object) -> bool:
     return isinstance(value, list) and any(map(_has_image, value))
 
 
-def bar() -> Callable[[Any], None] | None:
-    """A tqdm bar that follows the progress; None where tqdm is not there."""
-    if find_spec("tqdm") is None or not sys.stderr.isatty():
-        return None
-    from tqdm import tqdm
-
-    shown = tqdm(total=100, leave=False, bar_format="{desc:<24}{percentage:3.0f}% |{bar}| {elapsed}")
-
-    def show(progress: Any) -> None:
-        if progress.stage == "Done":
-            shown.close()
-            return
-        shown.set_description_str(progress.stage, refresh=False)
-        shown.n = round(100 * progress.fraction)
-        shown.refresh()
-
-    return show
-
-
 def main() -> int:
     """Run the batch and return its exit code."""
     arguments = own_arguments()
@@ -104,7 +85,7 @@ def main() -> int:
     from bubble_pattern_addon import batch
 
     quiet = "--quiet" in arguments
-    return batch.main(arguments, "pattern_batch.py", None if quiet else bar(), in_blender())
+    return batch.main(arguments, "pattern_batch.py", None if quiet else progress_bar(), in_blender())
 
 
 if __name__ == "__main__":

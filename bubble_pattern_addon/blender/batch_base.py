@@ -151,11 +151,16 @@ def stand_base(run: Run) -> tuple[bpy.types.Object, Base, Original]:
     return obj, replace(read, mesh=base.mesh), original
 
 
-def new_file_with(base: LoadedBase) -> bpy.types.Object:
-    """An empty file with `base` as its only object, in millimeters."""
+def new_file_in_millimeters() -> None:
+    """Open a new file without any object, one unit of which is a millimeter."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     units = bpy.context.scene.unit_settings
     units.system, units.scale_length, units.length_unit = 'METRIC', 0.001, 'MILLIMETERS'
+
+
+def new_file_with(base: LoadedBase) -> bpy.types.Object:
+    """The object of `base`, the only one in a new file."""
+    new_file_in_millimeters()
     obj = bpy.data.objects.new("Base", mesh_of(base.mesh))
     obj.data.set_sharp_from_angle(angle=np.radians(SHARP))  # such files say nothing of shading
     bpy.context.scene.collection.objects.link(obj)

@@ -23,10 +23,10 @@ from ..core.pattern import Pattern
 from ..core.pipeline import pattern_steps
 from ..core.progress import Progress, Steps, drive
 from ..core.quality import Quality, measure, min_margin, min_web, open_area
-from ..core.recipe import Recipe, RegionChoice, default_recipe
+from ..core.recipe import Recipe, RegionChoice, default_recipe, recipe_from_dict
 from ..core.region import Region, make_region
 from ..core.selection import select
-from ..core.sides import lies_on_both_sides
+from ..core.sides import check_one_side
 from ..core.solid import Part, part_steps
 from .marked_side import on_marked_side
 from .part_mesh import build_part_mesh
@@ -64,10 +64,13 @@ class Laid:
 
 @dataclass(frozen=True)
 class Source:
-    """A base as read for one pattern: geometry, region and what tells whether either has changed."""
+    """A base as read for one pattern: geometry, region, the region's triangles as a mask (T,), and what tells
+    whether any of them has changed.
+    """
 
     base: Base
     region: Region
+    selected: Bools
     fingerprint: str
 
 
@@ -102,13 +105,24 @@ def read_source(obj: bpy.types.Object, attribute: str, context: bpy.types.Contex
 
 def source_of(base: Base, selected: Bools) -> Source:
     """The source of a pattern on the triangles `selected` (T,) of `base`."""
-    return Source(base, make_region(base.mesh, selected), base.fingerprint(selected))
+    return Source(base, make_region(base.mesh, selected), selected, base.fingerprint(selected))
 
 
-def fitting_recipe(region: Region) -> Recipe:
-    """A good recipe for `region`, from its size alone."""
-    segments = region.boundary_segments
-    return default_recipe(region.area, float(np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1).sum()))
+def fitting_recipe(
+    region: Region, attribute: str, pitch: float | None = None, diameter: float | None = None
+) -> Recipe:
+    """A good recipe for `region`, the faces with this attribute: by its size alone where no length is given.
+
+    Of pitch and diameter the one that is given alone takes the other along in proportion. Raises RecipeError
+    where the two do not go together.
+    """
+    fitting = default_recipe(region.area, region.perimeter, RegionChoice(attribute=attribute))
+    given: dict[str, dict[str, float]] = {}
+    if pitch is not None:
+        given["packing"] = {"pitch": pitch}
+    if diameter is not None:
+        given["shaping"] = {"diameter": diameter}
+    return recipe_from_dict(given, fitting)
 
 
 def laying_steps(source: Source, recipe: Recipe) -> Steps[Laid]:
@@ -177,7 +191,7 @@ def react(settings: Any, context: bpy.types.Context, repack: bool) -> None:
         elif settings.seconds <= LIVE_SECONDS:
             drive(update_steps(obj, context))
     except PatternError as error:
-        settings.trouble = spoken(error)
+        settings.trouble = spoken(error, context)
 
 
 def is_only_shape(settings: Any) -> bool:
@@ -211,6 +225,7 @@ def joined(patterns: list[Pattern]) -> Pattern:
         return patterns[0]
 
     def all_of(values: list[Any]) -> Any:
+        """A column of every pattern, (n,) or (n, w) each, one after the other."""
         return np.concatenate(values)
 
     places = [pattern.places for pattern in patterns]
@@ -247,7 +262,7 @@ def apply_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[tupl
     for owner in owners:
         source = read_source(base_object, owner.bubble_pattern.region, context)
         if feature.depth is None:
-            check_one_side(source)
+            check_one_side(source.base.mesh, source.selected)
         if source.fingerprint != owner.bubble_pattern.fingerprint or is_outdated(owner.bubble_pattern):
             yield from update_steps(owner, context)
     base, original = read_whole(base_object, context)
@@ -260,17 +275,6 @@ def apply_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[tupl
         f"{base_object.name} Part", part, pattern.places, base, original, settings.wall_material
     )
     return place_part(base_object, owners, mesh, verdict_of(part), context), part
-
-
-def check_one_side(source: Source) -> None:
-    """Raises RegionError where through-holes would start from both sides of one wall."""
-    chosen = np.zeros(len(source.base.mesh.triangles), dtype=bool)
-    chosen[source.region.triangles] = True
-    if lies_on_both_sides(source.base.mesh, chosen):
-        raise RegionError(
-            "The region is on both sides of the wall, so that holes through it would run into one another: "
-            "edit the region and keep one side, or make the holes blind"
-        )
 
 
 def read_whole(obj: bpy.types.Object, context: bpy.types.Context) -> tuple[Base, Original]:

@@ -59,6 +59,7 @@ def read_pattern(obj: bpy.types.Object, mesh: Mesh) -> Pattern:
     points = obj.data.attributes
 
     def values(name: str, prop: str, dtype: type, width: int = 1) -> Floats:
+        """Attribute `name` of the points, (n,), or (n, width) where that is more than 1."""
         return read_values(points[name].data, prop, dtype, width)
 
     triangle = values("triangle", "value", np.int32).astype(np.int64)

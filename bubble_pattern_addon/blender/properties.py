@@ -66,6 +66,23 @@ def is_mesh(_settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
     return obj.type == 'MESH'
 
 
+def length_property(name: str, description: str, default: float = 0.0, **options: Any) -> Any:
+    """A length in the scene's unit, fine enough for fractions of a millimeter."""
+    return FloatProperty(
+        name=name,
+        description=description,
+        subtype='DISTANCE',
+        default=default,
+        step=1,
+        precision=4,
+        **options,
+    )
+
+
+# A length that something stands for cannot be nothing.
+SIZE = {"min": 1e-6, "soft_max": 10.0}
+
+
 class BubblePatternSettings(bpy.types.PropertyGroup):
     """Settings and results of one pattern, kept on its object. An object without a base is no pattern."""
 
@@ -89,24 +106,17 @@ class BubblePatternSettings(bpy.types.PropertyGroup):
         name="Region",
         description="Face attribute of the base that marks the target region",
     )
-    pitch: FloatProperty(
+    pitch: length_property(
         name="Pitch",
         description="Distance between the centers of neighboring features",
-        subtype='DISTANCE',
         default=0.003,
-        min=1e-6,
-        soft_max=10.0,
-        step=1,
-        precision=4,
+        **SIZE,
         update=repack,
     )
-    edge_offset: FloatProperty(
+    edge_offset: length_property(
         name="Edge Offset",
         description="Extra distance between the first row of features and the boundary of the region",
-        subtype='DISTANCE',
         default=0.0,
-        step=1,
-        precision=4,
         update=repack,
     )
     integrator: EnumProperty(
@@ -129,7 +139,7 @@ class BubblePatternSettings(bpy.types.PropertyGroup):
     iterations: IntProperty(
         name="Iterations",
         description="Most steps the bubbles may take to their equilibrium",
-        default=400,
+        default=Packing().iterations,
         min=1,
         soft_max=2000,
         update=repack,
@@ -137,21 +147,17 @@ class BubblePatternSettings(bpy.types.PropertyGroup):
     tolerance: FloatProperty(
         name="Tolerance",
         description="Stop when no bubble moves farther than this share of its pitch in one step",
-        default=1e-3,
+        default=Packing().tolerance,
         min=1e-9,
         max=1.0,
         precision=5,
         update=repack,
     )
-    diameter: FloatProperty(
+    diameter: length_property(
         name="Diameter",
         description="Diameter of the features",
-        subtype='DISTANCE',
         default=0.0018,
-        min=1e-6,
-        soft_max=10.0,
-        step=1,
-        precision=4,
+        **SIZE,
         update=reshape,
     )
     depth_mode: EnumProperty(
@@ -163,15 +169,11 @@ class BubblePatternSettings(bpy.types.PropertyGroup):
         ),
         default='THROUGH',
     )
-    depth: FloatProperty(
+    depth: length_property(
         name="Depth",
         description="Depth of the holes below the surface",
-        subtype='DISTANCE',
         default=0.001,
-        min=1e-6,
-        soft_max=10.0,
-        step=1,
-        precision=4,
+        **SIZE,
     )
     sides: IntProperty(
         name="Sides",
@@ -181,24 +183,18 @@ class BubblePatternSettings(bpy.types.PropertyGroup):
         soft_max=128,
         max=1024,
     )
-    min_web: FloatProperty(
+    min_web: length_property(
         name="Min Web",
         description="Material that must remain between two features",
-        subtype='DISTANCE',
         default=0.0,
         min=0.0,
-        step=1,
-        precision=4,
         update=reshape,
     )
-    min_margin: FloatProperty(
+    min_margin: length_property(
         name="Min Margin",
         description="Material that must remain between a feature and the boundary of the region",
-        subtype='DISTANCE',
         default=0.0,
         min=0.0,
-        step=1,
-        precision=4,
         update=reshape,
     )
     wall_material: PointerProperty(
@@ -296,14 +292,27 @@ def recipe_text(recipe: Recipe) -> str:
     return recipe_to_toml(replace(recipe, feature=Feature(), limits=Limits()))
 
 
-def spoken(error: PatternError) -> str:
-    """What `error` says, with the recipe's keys under their names in the sidebar."""
+def length_text(context: bpy.types.Context, value: float) -> str:
+    """A length in the scene's unit."""
+    units = context.scene.unit_settings
+    return (
+        bpy.utils.units.to_string(units.system, 'LENGTH', value * units.scale_length, precision=4)
+        if (units.system != 'NONE')
+        else f"{value:.4g}"
+    )
+
+
+def spoken(error: PatternError, context: bpy.types.Context) -> str:
+    """What `error` says, with the recipe's keys under their names in the sidebar and its lengths in the
+    scene's unit.
+    """
     known = BubblePatternSettings.bl_rna.properties
 
     def name_of(key: re.Match[str]) -> str:
+        """The sidebar's name of a key such as [packing] pitch; the key itself where the sidebar has none."""
         return known[key[1]].name if key[1] in known else key[0]
 
-    return re.sub(r"\[\w+\] (\w+)", name_of, str(error))
+    return re.sub(r"\[\w+\] (\w+)", name_of, error.told(lambda value: length_text(context, value)))
 
 
 def is_outdated(settings: Any) -> bool:

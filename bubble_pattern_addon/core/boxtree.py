@@ -48,8 +48,8 @@ def build_tree(corners: Floats) -> BoxTree:
 
 
 def meeting(tree: BoxTree, questions: int, overlap: Overlap) -> tuple[Ints, Ints]:
-    """All pairs (question, triangle) that `overlap` lets pass on every level; sorted by question, then
-    triangle.
+    """All pairs (question 0 .. questions-1, triangle) that `overlap` lets pass on every level: (m,) and (m,),
+    sorted by question, then triangle.
     """
     asked = np.arange(questions)
     box = np.zeros(questions, dtype=np.int64)
@@ -66,8 +66,9 @@ def meeting(tree: BoxTree, questions: int, overlap: Overlap) -> tuple[Ints, Ints
 
 
 def meeting_cylinders(tree: BoxTree, start: Floats, end: Floats, radius: Floats) -> tuple[Ints, Ints]:
-    """Pairs (cylinder, triangle) whose boxes may meet: cylinders from `start` to `end`, (n, 3), of `radius`
-    (n,).
+    """Pairs (cylinder, triangle) that may meet, (m,) and (m,), sorted; those left out do not.
+
+    Cylinders run from `start` to `end`, (n, 3), not at the same place, with `radius`, (n,).
     """
     axis = end - start
     length = np.linalg.norm(axis, axis=1)
@@ -76,6 +77,11 @@ def meeting_cylinders(tree: BoxTree, start: Floats, end: Floats, radius: Floats)
     reach = np.ascontiguousarray((np.abs(axis) / 2 + radius[:, None]).T)
 
     def overlap(which: Ints, middle: Floats, half: Floats) -> Bools:
+        """May the box with this middle and half size, (3, m), meet the cylinder `which`, (m,)? See Overlap.
+
+        It may where the boxes round both overlap, and the ball round the triangles' box is no farther from
+        the cylinder's axis than both radii.
+        """
         apart = np.zeros(len(which), dtype=bool)
         height, square, size = np.zeros((3, len(which)))
         for k in range(3):

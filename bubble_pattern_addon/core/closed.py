@@ -21,7 +21,7 @@ def edge_keys(triangles: Ints) -> tuple[Ints, Ints]:
 
 
 def is_closed(triangles: Ints) -> bool:
-    """Is every edge shared by exactly two triangles that run along it in opposite directions?"""
+    """Is every edge shared by exactly two of `triangles`, (T, 3), that run along it in opposite ways?"""
     if len(triangles) == 0 or len(triangles) % 2:
         return False
     keys = np.sort(edge_keys(triangles)[0])
@@ -30,7 +30,7 @@ def is_closed(triangles: Ints) -> bool:
 
 
 def euler_number(triangles: Ints) -> int:
-    """V - E + F of a closed surface, whose edges are 3/2 of its faces."""
+    """V - E + F of the closed surface `triangles`, (T, 3), whose edges are 3/2 of its faces."""
     used = np.zeros(int(triangles.max()) + 1 if len(triangles) else 0, dtype=bool)
     used[triangles] = True
     return int(used.sum()) - len(triangles) * 3 // 2 + len(triangles)
@@ -52,7 +52,7 @@ def shells(mesh: Mesh) -> Ints:
 
 
 def shell_volumes(mesh: Mesh) -> Floats:
-    """Signed volume of every connected shell, (shells,); a cavity's is negative."""
+    """Signed volume of every connected shell, (shells,), in cubic units; a cavity's is negative."""
     return np.bincount(shells(mesh), weights=signed_volumes(mesh))
 
 

@@ -24,7 +24,8 @@ def write_features(path: Path, pattern: Pattern) -> None:
 
     An id is the number of the feature's bubble: it stays when the limits leave out other features.
     x, y, z is the centre on the surface, nx, ny, nz the unit normal there, outward; lengths in the unit of
-    the base. Numbers are written so that they read back as the same double.
+    the base. Numbers are written so that they read back as the same double. OSError where the file can't be
+    written.
     """
     numbers = np.column_stack([pattern.position, pattern.normal, pattern.diameter, pattern.pitch])
     with path.open("w", newline="", encoding="utf-8") as file:
@@ -39,7 +40,7 @@ def write_features(path: Path, pattern: Pattern) -> None:
 
 
 def make_report(region: Region, pattern: Pattern, part: Part, seconds: Mapping[str, float]) -> dict[str, Any]:
-    """The figures of a run, ready for JSON; a figure with nothing to measure is None.
+    """The figures of a run in the unit of the base, ready for JSON; one with nothing to measure is None.
 
     features, watertight, genus, volume, open_area, min_web, min_margin, quality{six, psi6, gap_cv, gap_min,
     rim_cv} and seconds{region, pack, shape, add}; further wall{min, max}, the near wall's thickness at the
@@ -108,5 +109,5 @@ def _without_nonsense(value: Any) -> Any:
 
 
 def write_report(path: Path, report: Mapping[str, Any]) -> None:
-    """The report as JSON."""
+    """The report as JSON. OSError where the file can't be written."""
     path.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")

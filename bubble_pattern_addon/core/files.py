@@ -158,7 +158,10 @@ def _check_numbers(mesh: Mesh, path: Path) -> None:
 
 
 def write_mesh(path: Path, mesh: Mesh) -> None:
-    """The mesh in the format of the path's suffix (one of SUFFIXES): STL is binary, 3MF says millimetres."""
+    """The mesh in the format of the path's suffix (one of SUFFIXES): STL is binary, 3MF says millimetres.
+
+    Coordinates are written as they are, in the unit of the base. OSError where the file can't be written.
+    """
     if path.suffix.lower() == ".3mf":
         write_3mf(path, mesh, path.stem)
         return

@@ -96,7 +96,9 @@ def measure_points(
 
 
 def min_web(pattern: Pattern) -> float:
-    """Least material between features of one sheet, |xi - xj| - (di + dj) / 2; inf without neighbours."""
+    """Least material between features of one sheet, |xi - xj| - (di + dj) / 2, a length in the unit of the
+    base, below 0 where they overlap; inf without neighbours.
+    """
     near = neighbours(pattern.position, pattern.normal, pattern.pitch)
     if not len(near.first):
         return np.inf
@@ -105,7 +107,9 @@ def min_web(pattern: Pattern) -> float:
 
 
 def min_margin(pattern: Pattern, region: Region) -> float:
-    """Least distance from a feature's edge to the region's boundary; inf when there is no such pair."""
+    """Least distance from a feature's edge to the region's boundary, in the unit of the base, below 0 where
+    it is crossed; inf when there is no such pair.
+    """
     if not len(pattern) or not len(region.boundary_segments):
         return np.inf
     distance = boundary_distance(pattern.position, region.boundary_segments)
@@ -113,7 +117,7 @@ def min_margin(pattern: Pattern, region: Region) -> float:
 
 
 def open_area(pattern: Pattern, region: Region) -> float:
-    """Share of the region's area that the features, as circles of their diameter, take."""
+    """Share of the region's area, 0 to 1, that the features take, as circles of their diameter."""
     return float(np.pi / 4 * (pattern.diameter**2).sum() / region.area)
 
 

@@ -154,7 +154,8 @@ def neat(length: float) -> float:
 
 
 def default_recipe(area: float, perimeter: float = 0.0, choice: RegionChoice | None = None) -> Recipe:
-    """A good recipe for a target region of this area and with boundary loops of this length in all.
+    """A good recipe for a target region of this area and with boundary loops of this length in all, both in
+    the unit of the base; pitch and diameter are lengths in it.
 
     About 500 features, in a hexagonal arrangement where one bubble takes sqrt(3)/2 pitch^2 of the surface; a
     narrow strip, about 2 area / perimeter wide, gets at least three rows. The diameter is 0.6 of the pitch.
@@ -407,27 +408,37 @@ def _check_room(recipe: Recipe) -> None:
         return
     if recipe.limits.min_diameter > diameter:
         raise RecipeError(
-            f"[limits] min_diameter = {recipe.limits.min_diameter:g} is more than the diameter {diameter:g}, "
-            "so that no feature would be left: make it smaller"
+            "[limits] min_diameter = {least} is more than the diameter {diameter}, which leaves no feature: "
+            "make it smaller",
+            least=recipe.limits.min_diameter,
+            diameter=diameter,
         )
     if not isinstance(pitch, Constant):
         return
     if diameter >= pitch.value:
         raise RecipeError(
-            f"[shaping] diameter = {diameter:g} leaves no web at pitch {pitch.value:g}: "
-            "make the diameter smaller than the pitch"
+            "[shaping] diameter = {diameter} leaves no web at pitch {pitch}: "
+            "make the diameter smaller than the pitch",
+            diameter=diameter,
+            pitch=pitch.value,
         )
     margin = (pitch.value - diameter) / 2 + offset
     if margin < 0:
         raise RecipeError(
-            f"[packing] edge_offset = {offset:g} would push features {-margin:g} over the boundary: "
-            f"give at least {-(pitch.value - diameter) / 2:g}"
+            "[packing] edge_offset = {offset} would push features {over} over the boundary: "
+            "give at least {least}",
+            offset=offset,
+            over=-margin,
+            least=(diameter - pitch.value) / 2,
         )
     web = pitch.value - diameter
     if recipe.limits.min_web > web:
         raise RecipeError(
-            f"[limits] min_web = {recipe.limits.min_web:g} is more than pitch - diameter = {web:g}: "
-            f"make the diameter at most {pitch.value - recipe.limits.min_web:g}"
+            "[limits] min_web = {limit} is more than pitch - diameter = {web}: "
+            "make the diameter at most {most}",
+            limit=recipe.limits.min_web,
+            web=web,
+            most=pitch.value - recipe.limits.min_web,
         )
 
 

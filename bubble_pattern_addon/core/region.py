@@ -88,6 +88,12 @@ class Region:
         ends = np.stack([(corner + 1) % 3, (corner + 2) % 3], axis=1)
         return self.corners[row[:, None], ends]
 
+    @cached_property
+    def perimeter(self) -> float:
+        """Length of all boundary loops together."""
+        start, end = self.boundary_segments.swapaxes(0, 1)
+        return float(np.linalg.norm(end - start, axis=1).sum())
+
 
 def make_region(base: Mesh, selected: Bools) -> Region:
     """Region made of the `selected` (T,) triangles of `base`.

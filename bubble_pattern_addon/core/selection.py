@@ -66,7 +66,8 @@ def _named(name: str, known: Mapping[str, Bools], kind: str) -> Bools:
 def nearest_triangle(base: Mesh, point: Floats) -> int:
     """Row of the triangle nearest to `point` (3,); the first of several at the same distance.
 
-    Triangles without area or with coordinates that are not numbers are passed over.
+    Triangles without area or with coordinates that are not numbers are passed over. Raises RegionError where
+    no other is left.
     """
     size = np.linalg.norm(base.area_vectors, axis=1)
     usable = np.flatnonzero(size > 0)  # NaN compares false

@@ -41,9 +41,12 @@ def shaped(
     pattern = limited(replace(bubbles, diameter=wished, notes=notes), region, recipe.limits)
     if len(bubbles) and not len(pattern):
         raise RecipeError(
-            f"No feature is left: diameters up to {wished.max():.4g} do not go with [limits] min_web = "
-            f"{recipe.limits.min_web:g}, min_margin = {recipe.limits.min_margin:g} and min_diameter = "
-            f"{recipe.limits.min_diameter:g}; make one of these smaller or the pitch larger"
+            "No feature is left: diameters up to {widest} do not go with [limits] min_web = {web}, "
+            "min_margin = {margin} and min_diameter = {least}; make one of these smaller or the pitch larger",
+            widest=float(wished.max()),
+            web=recipe.limits.min_web,
+            margin=recipe.limits.min_margin,
+            least=recipe.limits.min_diameter,
         )
     return pattern
 

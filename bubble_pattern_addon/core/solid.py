@@ -118,7 +118,11 @@ def plan_steps(base: Mesh, pattern: Pattern, feature: Feature) -> Steps[Plan]:
 
 
 def cut(plan: Plan) -> tuple[Mesh, Ints]:
-    """The boolean of `plan` on its base, split where many holes crowd one face: see `subtract`."""
+    """The boolean of `plan` on its base, split where many holes crowd one face.
+
+    Returns the result and the facet each of its triangles lies on, (T',), as `subtract` does. Raises
+    BaseError where the boolean fails.
+    """
     wall, base = plan.wall, plan.sound.mesh
     through = np.flatnonzero(plan.meets & np.isfinite(wall.seen_axis))
     feature = wall.seen_feature[through]
@@ -132,8 +136,8 @@ def subtract(base: Mesh, face: Ints, cutters: Cutters) -> tuple[Mesh, Ints]:
     """`base`, whose triangles belong to the faces `face`, (T,), less `cutters`, in one boolean.
 
     Returns the result and the facet each of its triangles lies on, (T',): a face of the base, or -1 - a
-    facet of the cutters. Faces keep their identity through the
-    boolean, which also keeps it from merging any of the base's own edges, however flat.
+    facet of the cutters. Faces keep their identity through the boolean, which also keeps it from merging any
+    of the base's own edges, however flat. Raises BaseError where the boolean fails.
     """
     if len(cutters.facet) == 0:
         return base, face

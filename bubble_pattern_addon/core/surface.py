@@ -94,7 +94,7 @@ class Spots(NamedTuple):
     barycentric: Floats
 
     def take(self, which: Ints | Bools) -> Spots:
-        """The places `which`."""
+        """The places `which`: rows (m,) or a mask (n,)."""
         return Spots(self.row[which], self.barycentric[which])
 
 
@@ -130,12 +130,12 @@ def make_charts(region: Region) -> Charts:
 
 
 def positions(charts: Charts, spots: Spots) -> Floats:
-    """Points in space, (n, 3)."""
+    """The places `spots` as points in space, (n, 3)."""
     return np.einsum("nk,nkc->nc", spots.barycentric, charts.region.corners[spots.row])
 
 
 def to_frame(charts: Charts, row: Ints, vectors: Floats) -> Complex:
-    """Vectors (n, 3) projected onto the planes of the triangles `row` (n,)."""
+    """Vectors (n, 3) projected onto the planes of the triangles `row` (n,), as steps there, (n,)."""
     return np.einsum("nac,nc->na", charts.axes[row], vectors).view(np.complex128)[:, 0]
 
 

@@ -1,4 +1,4 @@
-"""Laws of steps 1 and 2 end to end, and of step 3 on what they give."""
+"""Laws of steps 1 and 2 end to end, and of all three on any plate."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from bubble_pattern_addon.core.progress import Progress, drive
 from bubble_pattern_addon.core.quality import measure, min_margin, min_web
 from bubble_pattern_addon.core.recipe import Feature, Packing, Recipe, Shaping
 from bubble_pattern_addon.core.region import Region, make_region
-from bubble_pattern_addon.core.solid import Part, part_steps
+from bubble_pattern_addon.core.solid import part_steps
 from scripts import shapes
 from scripts.shapes import SHAPES, Shape
 
@@ -76,9 +76,17 @@ def everything(pattern: Pattern) -> list[str]:
     return [hashlib.sha256(np.ascontiguousarray(column).tobytes()).hexdigest() for column in columns]
 
 
-def check_invariants(
-    region: Region, pattern: Pattern, pitch: float, edge_offset: float = 0.0, narrow: bool = False
-) -> None:
+def between_two_sides(region: Region, point: Floats, reach: float) -> bool:
+    """Whether the boundary comes within `reach` of the point on opposite sides of it."""
+    start, along = region.boundary_segments[:, 0], np.diff(region.boundary_segments, axis=1)[:, 0]
+    share = np.clip(((point - start) * along).sum(axis=1) / (along**2).sum(axis=1), 0, 1)
+    to_foot = start + share[:, None] * along - point
+    distance = np.linalg.norm(to_foot, axis=1)
+    to_foot = (to_foot / distance[:, None])[distance < reach]
+    return bool((to_foot @ to_foot.T).min() < -0.5)
+
+
+def check_invariants(region: Region, pattern: Pattern, pitch: float, edge_offset: float = 0.0) -> None:
     """On the surface, inside the region, square to it, with the first row along the boundary."""
     places, corners = pattern.places, region.base.corners[pattern.places.triangle]
     assert np.isin(places.triangle, region.triangles).all()
@@ -100,8 +108,9 @@ def check_invariants(
     first = distance[pattern.row == 0]
     if len(region.boundary_segments):
         assert distance.min() >= (0.5 - 1e-2) * pitch + edge_offset
-        # In places too narrow for two rows a single one runs along the middle.
-        assert first.max() <= (0.95 if narrow else 0.52) * pitch + edge_offset
+        # Where there is no room for two rows a single one runs along the middle.
+        for point in pattern.position[pattern.row == 0][first > 0.52 * pitch + edge_offset]:
+            assert between_two_sides(region, point, 0.95 * pitch + edge_offset)
     else:
         assert (pattern.row == -1).all()
 
@@ -113,7 +122,7 @@ def check_invariants(
 def test_on_the_surface_inside_the_region_along_the_boundary(name: str) -> None:
     known = laid(name)
     assert len(known.pattern)
-    check_invariants(known.region, known.pattern, known.pitch, narrow=name in NARROW)
+    check_invariants(known.region, known.pattern, known.pitch)
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name != "fold"])
@@ -230,7 +239,7 @@ def test_another_process_gives_the_same_features() -> None:
 
 
 def test_ids_do_not_depend_on_the_shaping() -> None:
-    known = laid("trapezoid")
+    known = laid("l")
     thin = replace(uniform(known.pitch), shaping=Shaping(Constant(0.2 * known.pitch)))
     pattern = lay(known.shape.mesh, known.shape.selected, thin)[1]
     assert (pattern.diameter == 0.2 * known.pitch).all()
@@ -239,7 +248,7 @@ def test_ids_do_not_depend_on_the_shaping() -> None:
 
 def test_vertices_need_not_be_shared() -> None:
     """A base as an STL file has it, every face with vertices of its own, gives the same pattern."""
-    known = laid("panel")
+    known = laid("panel-coarse")
     mesh = known.shape.mesh
     soup = Mesh(mesh.corners.reshape(-1, 3), np.arange(mesh.triangles.size).reshape(-1, 3))
     pattern = lay(soup, known.shape.selected, uniform(known.pitch))[1]
@@ -276,7 +285,7 @@ def test_more_than_a_million_features_are_refused_at_once() -> None:
 
 
 def test_progress_goes_forward_and_can_be_given_up() -> None:
-    shape = SHAPES["trapezoid"]()
+    shape = SHAPES["parts"]()
     steps = pattern_steps(make_region(shape.mesh, shape.selected), uniform(shape.pitch))
     told: list[Progress] = []
     drive(steps, told.append)
@@ -288,32 +297,6 @@ def test_progress_goes_forward_and_can_be_given_up() -> None:
     given_up.close()
 
 
-# -- with step 3 ---------------------------------------------------------------------------------------------
-
-
-def cut(mesh: Mesh, pattern: Pattern) -> Part:
-    return drive(part_steps(mesh, pattern, Feature()))
-
-
-def check_part(mesh: Mesh, pattern: Pattern, base_euler: int) -> None:
-    """Watertight, and the Euler characteristic falls by exactly two per hole."""
-    part = cut(mesh, pattern)
-    assert part.check.problems == ()
-    assert part.check.watertight
-    assert part.pierced.all()
-    edges = np.sort(part.mesh.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    sides, count = np.unique(edges, axis=0, return_counts=True)
-    assert (count == 2).all()
-    euler = len(np.unique(part.mesh.triangles)) - len(sides) + len(part.mesh.triangles)
-    assert euler == base_euler - 2 * len(pattern)
-
-
-@pytest.mark.parametrize(("name", "base_euler"), [("panel-slab", 2), ("trapezoid-slab", 0)])
-def test_a_slab_loses_two_of_its_euler_characteristic_per_hole(name: str, base_euler: int) -> None:
-    known = laid(name)
-    check_part(known.shape.mesh, known.pattern, base_euler)
-
-
 # -- on any region -------------------------------------------------------------------------------------------
 
 
@@ -323,7 +306,7 @@ def plates(draw: st.DrawFn) -> tuple[list[Floats], float]:
     sides = draw(st.integers(3, 7))
     turn = draw(st.floats(0, 6.28))
     angle = turn + np.arange(sides) * 2 * np.pi / sides
-    corners = draw(st.floats(14, 30)) * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    corners = draw(st.floats(12, 18)) * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     stretch = np.array([draw(st.floats(0.8, 2.5)), 1.0])
     radius = draw(st.sampled_from([0.0, 2.0, 5.0]))
     outer = corners * stretch
@@ -334,7 +317,7 @@ def plates(draw: st.DrawFn) -> tuple[list[Floats], float]:
     return outline, draw(st.floats(1.5, 4.0))
 
 
-@settings(max_examples=12, deadline=None, derandomize=True)
+@settings(max_examples=12)
 @given(plates(), st.sampled_from(["coarse", "fine"]))
 def test_any_plate_keeps_the_laws(plate: tuple[list[Floats], float], triangles: str) -> None:
     outline, pitch = plate
@@ -342,9 +325,9 @@ def test_any_plate_keeps_the_laws(plate: tuple[list[Floats], float], triangles: 
     solid = shapes.slab(sheet, 1.0)
     selected = np.arange(len(solid.triangles)) < len(sheet.triangles)
     region, pattern = lay(solid, selected, uniform(pitch))
-    check_invariants(region, pattern, pitch, narrow=True)
+    check_invariants(region, pattern, pitch)
     assert min_web(pattern) > 0
     base_euler = 2 if len(outline) == 1 else 0
-    part = cut(solid, pattern)
+    part = drive(part_steps(solid, pattern, Feature(sides=16)))
     assert part.check.problems == ()
     assert (part.check.base_euler, part.check.euler) == (base_euler, base_euler - 2 * len(pattern))

@@ -75,6 +75,13 @@ def test_a_recipe_written_and_read_is_the_same_recipe(recipe: Recipe) -> None:
     assert recipe_from_dict(tomllib.loads(recipe_to_toml(recipe))) == recipe
 
 
+def test_an_error_tells_its_lengths_as_asked() -> None:
+    error = RecipeError("A web of {web} at {pitch}", web=0.5, pitch=2.0)
+    assert str(error) == "A web of 0.5 at 2"
+    assert error.told(lambda value: f"{1000 * value:g} mm") == "A web of 500 mm at 2000 mm"
+    assert str(RecipeError("a {name} in braces")) == "a {name} in braces"
+
+
 @given(st.floats(1e-9, 1e9))
 def test_neat_lengths_are_close_and_short(length: float) -> None:
     assert abs(math.log(neat(length) / length)) < math.log(1.11)

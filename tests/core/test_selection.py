@@ -11,10 +11,7 @@ from bubble_pattern_addon.core.mesh import Mesh
 from bubble_pattern_addon.core.recipe import RegionChoice
 from bubble_pattern_addon.core.selection import grown, nearest_triangle, neighbour_pairs, select
 
-
-def as_mesh(body: trimesh.Trimesh) -> Mesh:
-    return Mesh(np.array(body.vertices, dtype=float), np.array(body.faces, dtype=np.int64))
-
+from .bases import as_mesh
 
 BOX = as_mesh(trimesh.creation.box((2, 4, 6)))
 DRUM = as_mesh(trimesh.creation.cylinder(radius=5, height=4, sections=36))
@@ -64,11 +61,13 @@ def test_triangles_without_area_or_numbers_are_never_the_nearest() -> None:
         nearest_triangle(Mesh(vertices, mesh.triangles[:1]), np.zeros(3))
 
 
+GRID = np.array([[i, j, 40 - i - j] for i in range(41) for j in range(41 - i)]) / 40
+SAMPLES = np.einsum("gk,tkx->tgx", GRID, DRUM.corners)
+
+
 @given(st.tuples(*[st.floats(-20, 20)] * 3))
 def test_the_nearest_triangle_is_the_nearest_by_dense_sampling(point: tuple[float, float, float]) -> None:
-    grid = np.array([[i, j, 40 - i - j] for i in range(41) for j in range(41 - i)]) / 40
-    samples = np.einsum("gk,tkx->tgx", grid, DRUM.corners)
-    sampled = np.linalg.norm(samples - point, axis=2).min(axis=1)
+    sampled = np.linalg.norm(SAMPLES - point, axis=2).min(axis=1)
     chosen = nearest_triangle(DRUM, np.array(point))
     assert sampled[chosen] <= sampled.min() + 0.2  # spacing of the samples on the largest triangle
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from bubble_pattern_addon.core.field_tables import KINDS
 from bubble_pattern_addon.core.field_tables import READERS as FIELD_READERS
-from bubble_pattern_addon.core.recipe import READERS, recipe_from_dict
+from bubble_pattern_addon.core.recipe import READERS, Recipe, recipe_from_dict
 
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text("utf-8")
@@ -61,6 +61,20 @@ def test_the_readme_names_every_kind_of_field_and_every_key_of_it() -> None:
     keys = {key for key in FIELD_READERS if key not in named}
     assert keys == set()
     assert [kind for kind in KINDS if kind not in named] == []
+
+
+def test_the_readme_s_defaults_are_the_recipe_s() -> None:
+    recipe, section, compared = Recipe(), "", 0
+    for row in re.findall(r"^\| (`\[\w+\]`)? ?\| `(\w+).*\| ([^|]+) \|$", README, re.MULTILINE):
+        section = row[0].strip("`[]") or section
+        default = getattr(getattr(recipe, section), row[1])
+        if isinstance(default, (int, float)) and not isinstance(default, bool):
+            assert float(row[2]) == default, row[1]
+            compared += 1
+        elif isinstance(default, str):
+            assert row[2] == f'`"{default}"`', row[1]
+            compared += 1
+    assert compared >= 9
 
 
 def test_the_readme_s_commands_name_scripts_that_are_there() -> None:

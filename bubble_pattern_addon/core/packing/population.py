@@ -19,7 +19,7 @@ VOID = 0.8
 # Free bubbles nearer to the boundary than this many radii have been pressed through the first row.
 PRESSED_OUT = 2.2
 # A bubble whose overlap ratio is above this is too crowded; it is 6 in the hexagonal arrangement.
-CROWDED = 8.0
+CROWDED = 6.8
 # Only bubbles with less overlap than this can stand at a void.
 LONELY = 5.6
 

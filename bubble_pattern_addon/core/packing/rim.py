@@ -18,6 +18,8 @@ FINENESS = 5
 # A turn of the inset line by more than this within 0.7 pitch is a sharp corner and gets a bubble of its own.
 SHARP = np.radians(40.0)
 CORNER_SCALE = 0.35
+# Corners nearer to each other than this, in pitches, share one bubble: two rows do not fit between them.
+ONE_CORNER = 0.85
 # Bubbles of the first row are never spaced closer than this share of the pitch.
 CLOSEST = 0.92
 # A stretch of the first row is straight when it turns by less than this in all.
@@ -306,13 +308,46 @@ def _sharp_knots(points: Floats, arc: Floats, chain: Ints, closed: Bools) -> Boo
     # A closed line's first knot stands again as its last: the first speaks for both.
     turn[last[closed]] = 0.0
     sharp = np.zeros(len(arc), dtype=bool)
+    for line in range(len(closed)):
+        knots = np.arange(first[line], last[line] + 1)
+        length = arc[last[line]] - arc[first[line]] if closed[line] else np.inf
+        sharp[knots[_corners(arc[knots] - arc[first[line]], turn[knots], length)]] = True
+    return sharp
+
+
+def _corners(arc: Floats, turn: Floats, around: float) -> Ints:
+    """Which knots of a line, at `arc` (k,), are its corners, from how far it turns there, (k,).
+
+    A corner is where the line turns most. Corners so near one another that one bubble stands for them, as at
+    the end of a strip, are one in their middle. around: the line's length if it is closed, else infinite
+    """
+
+    def apart(one: Floats | float, other: Floats | float) -> Floats:
+        return np.minimum(np.abs(one - other), np.abs(around - np.abs(one - other)))
+
+    peaks: list[int] = []
     candidates = np.flatnonzero(turn > SHARP)
     for knot in candidates[np.argsort(-turn[candidates], kind="stable")]:
-        distance = np.abs(arc[candidates] - arc[knot])
-        distance = np.where(around[knot] > 0, np.minimum(distance, np.abs(around[knot] - distance)), distance)
-        near = candidates[(chain[candidates] == chain[knot]) & (distance < 2 * CORNER_SCALE)]
-        sharp[knot] = not sharp[near].any()
-    return sharp
+        if not peaks or apart(arc[peaks], arc[knot]).min() > CORNER_SCALE:
+            peaks.append(int(knot))
+    found: list[int] = []
+    groups = _groups(np.sort(peaks), arc, around)
+    for group in groups:
+        low, high = arc[group[0]], arc[group[-1]]
+        middle = (low + high + (around if high < low else 0.0)) / 2
+        middle -= around if middle >= around else 0.0
+        found.append(int(np.abs(arc - middle).argmin()))
+    return np.array(found, dtype=np.int64)
+
+
+def _groups(peaks: Ints, arc: Floats, around: float) -> list[Ints]:
+    """Peaks in the order of the line, in groups of those nearer to the next than two corners' bubbles fit."""
+    if len(peaks) < 2:
+        return [peaks] if len(peaks) else []
+    groups = np.split(peaks, np.flatnonzero(np.diff(arc[peaks]) > ONE_CORNER) + 1)
+    if len(groups) > 1 and around - arc[peaks[-1]] + arc[peaks[0]] <= ONE_CORNER:
+        groups = [np.concatenate([groups[-1], groups[0]]), *groups[1:-1]]
+    return groups
 
 
 def first_row(track: Track) -> FirstRow:
