@@ -8,30 +8,34 @@ command. What only Blender can do (a .blend as base, a .blend or a picture as ou
 from __future__ import annotations
 
 import argparse
+import shutil
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn, Protocol, cast
 
-from .core.errors import BaseError, OutputError, PatternError, RecipeError, RegionError
+import numpy as np
+
+from .core.errors import BaseError, OutputError, PatternError
 from .core.export import make_report, write_features, write_report
+from .core.field_tables import wanted, with_images
 from .core.files import LoadedBase, load_base, output_folder, write_mesh
-from .core.mesh import Bools
-from .core.metric import Constant
+from .core.mesh import Bools, Floats
 from .core.pattern import Pattern
 from .core.pipeline import pattern_steps
 from .core.progress import Progress, Steps, drive, within
-from .core.quality import min_margin, min_web
 from .core.recipe import Recipe, default_recipe, load_recipe, recipe_to_toml
 from .core.region import Region, make_region
 from .core.selection import select
 from .core.sides import check_one_side
 from .core.solid import Part, part_steps
 from .core.soundness import sound_base
+from .core.surroundings import Surroundings
+from .pixels import read_image
 from .terminal import line_on, silenced
 
 EXAMPLE = """\
@@ -51,7 +55,10 @@ example of a run:
 
 @dataclass(frozen=True)
 class Run:
-    """Everything a batch run knows when the part is made; selected: (T,) the target region's triangles."""
+    """Everything a batch run knows when the part is made.
+
+    selected: (T,) the target region's triangles; origin: the folder from which the recipe names its images
+    """
 
     recipe: Recipe
     base: LoadedBase
@@ -60,6 +67,7 @@ class Run:
     pattern: Pattern
     part: Part
     report: Mapping[str, Any]
+    origin: Path = Path()
 
 
 class BlenderSide(Protocol):
@@ -94,15 +102,33 @@ def run_steps(base: LoadedBase, recipe_file: Path) -> Steps[Run]:
     sound_base(base.mesh)  # step 3 looks again; but nobody shall wait for a packing to be told of a hole
     if recipe.feature.depth is None:
         check_one_side(base.mesh, selected)
+    surroundings = surroundings_of(base, read_images(recipe, recipe_file.parent))
     clock.stop("region")
-    pattern = yield from clock.timed(within(pattern_steps(region, recipe), 0.0, 0.5))
-    check_limits(recipe, region, pattern)
+    pattern = yield from clock.timed(within(pattern_steps(region, recipe, surroundings), 0.0, 0.5))
     part = yield from within(part_steps(base.mesh, pattern, recipe.feature), 0.5, 1.0)
     clock.stop("add")
     report = make_report(region, pattern, part, clock.seconds)
     if part.check.problems:
         raise BaseError(f"The part is not good: {' '.join(part.check.problems)}")
-    return Run(recipe, base, selected, region, pattern, part, report)
+    return Run(recipe, base, selected, region, pattern, part, report, recipe_file.parent)
+
+
+def read_images(recipe: Recipe, folder: Path) -> dict[str, Floats]:
+    """The images that the recipe's fields ask for, by name, seen from `folder`. FieldError: see pixels."""
+    names = wanted(recipe.packing.pitch, recipe.shaping.diameter).images
+    return {name: read_image(name, folder) for name in sorted(names)}
+
+
+def surroundings_of(base: LoadedBase, images: Mapping[str, Floats]) -> Surroundings:
+    """What the recipe's fields may ask for beside the region."""
+    masks = {name: mask.astype(np.float64) for name, mask in base.attributes.items()}
+    return Surroundings(
+        attributes=masks | dict(base.values),
+        materials=base.materials,
+        uv_maps=base.uv_maps,
+        images=images,
+        objects=base.objects,
+    )
 
 
 class Clock:
@@ -133,28 +159,6 @@ class Clock:
             yield progress
 
 
-def check_limits(recipe: Recipe, region: Region, pattern: Pattern) -> None:
-    """RegionError where no feature fits, RecipeError where less material remains than the limits ask for."""
-    if not len(pattern):
-        raise RegionError(
-            "No feature fits into the target region: make the pitch smaller or the region larger"
-        )
-    web, margin, limits = min_web(pattern), min_margin(pattern, region), recipe.limits
-    diameter = recipe.shaping.diameter
-    most = (
-        f"make the diameter at most {diameter.value - (limits.min_web - web):.4g}"
-        if isinstance(diameter, Constant)
-        else "make the diameters smaller"
-    )
-    if web < limits.min_web:
-        raise RecipeError(f"The smallest web is {web:.4g}, below min_web = {limits.min_web:g}: {most}")
-    if margin < limits.min_margin:
-        raise RecipeError(
-            f"The smallest margin is {margin:.4g}, below min_margin = {limits.min_margin:g}: "
-            f"raise edge_offset by {limits.min_margin - margin:.4g}"
-        )
-
-
 def write_run(run: Run, folder: Path, blender: Callable[[], BlenderSide]) -> None:
     """All files of a run, into a folder that is there (see files.output_folder)."""
     write_mesh(folder / "part.stl", run.part.mesh)
@@ -162,11 +166,27 @@ def write_run(run: Run, folder: Path, blender: Callable[[], BlenderSide]) -> Non
         write_mesh(folder / f"part.{name}", run.part.mesh)
     write_features(folder / "features.csv", run.pattern)
     write_report(folder / "report.json", run.report)
-    (folder / "recipe.toml").write_text(recipe_to_toml(run.recipe), encoding="utf-8")
+    recipe = with_copied_images(run, folder)
+    (folder / "recipe.toml").write_text(recipe_to_toml(recipe), encoding="utf-8")
     if run.recipe.output.blend:
         blender().write_blend(folder / "pattern.blend", run)
     if run.recipe.output.picture:
         blender().write_picture(folder / "part.png", run)
+
+
+def with_copied_images(run: Run, folder: Path) -> Recipe:
+    """The recipe with the image files that it names copied beside it: there it makes the same part."""
+    packing, shaping = run.recipe.packing, run.recipe.shaping
+    names: dict[str, str] = {}
+    for number, name in enumerate(sorted(wanted(packing.pitch, shaping.diameter).images), 1):
+        if (run.origin / name).is_file():  # else it is in the .blend
+            names[name] = f"image_{number}{Path(name).suffix}"
+            shutil.copyfile(run.origin / name, folder / names[name])
+    return replace(
+        run.recipe,
+        packing=replace(packing, pitch=with_images(packing.pitch, names)),
+        shaping=replace(shaping, diameter=with_images(shaping.diameter, names)),
+    )
 
 
 def blender_side() -> BlenderSide:
@@ -271,7 +291,9 @@ def summary(run: Run, out: Path) -> str:
     """One line on what was made."""
     figures = run.report
     webs = "" if figures["min_web"] is None else f", smallest web {figures['min_web']:.3g}"
+    limits = figures["limits"]
+    cut = "".join(f", {limits[key]:,} {key}" for key in ("shrunk", "dropped") if limits[key])
     return (
-        f"{figures['features']:,} holes, {100 * figures['open_area']:.1f} % open{webs}; "
+        f"{figures['features']:,} holes, {100 * figures['open_area']:.1f} % open{webs}{cut}; "
         f"watertight part in {out / 'part.stl'}"
     )

@@ -15,8 +15,9 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
+from bubble_pattern_addon.core.distance import boundary_distance
 from bubble_pattern_addon.core.mesh import Floats, Ints
-from bubble_pattern_addon.core.quality import Quality, boundary_distance, measure_points, neighbours
+from bubble_pattern_addon.core.quality import Quality, measure_points, neighbours
 from scripts.benchmark import pack
 from scripts.shapes import SHAPES
 

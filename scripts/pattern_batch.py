@@ -49,7 +49,9 @@ def find_libraries(arguments: list[str]) -> None:
 
 
 def _asks_for_blender(arguments: list[str]) -> bool:
-    """Whether the base is a .blend or the recipe wants one or a picture; a broken recipe is told of later."""
+    """Whether the base is a .blend, or the recipe wants one or a picture, or has an image to be read; a
+    broken recipe is told of later.
+    """
     import tomllib
 
     if any(argument.lower().endswith(".blend") for argument in arguments):
@@ -57,11 +59,19 @@ def _asks_for_blender(arguments: list[str]) -> bool:
     for argument in arguments:
         if argument.lower().endswith(".toml"):
             try:
-                output = tomllib.loads(Path(argument).read_text("utf-8")).get("output", {})
-                return bool(output.get("blend") or output.get("picture"))
+                tables = tomllib.loads(Path(argument).read_text("utf-8"))
+                output = tables.get("output", {})
+                return bool(output.get("blend") or output.get("picture")) or _has_image(tables)
             except (OSError, ValueError, AttributeError):
                 return False
     return False
+
+
+def _has_image(value: object) -> bool:
+    """Whether there is a field of the kind image somewhere in these tables."""
+    if isinstance(value, dict):
+        return value.get("kind") == "image" or any(map(_has_image, value.values()))
+    return isinstance(value, list) and any(map(_has_image, value))
 
 
 def main() -> int:

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
+from bubble_pattern_addon.core.distance import boundary_distance
 from bubble_pattern_addon.core.mesh import Floats, Mesh
-from bubble_pattern_addon.core.quality import boundary_distance
 from bubble_pattern_addon.terminal import silenced
 from scripts.shapes import ISLAND, TRAPEZOID, TRAPEZOID_RADIUS, inside_outline, outline_segments
 

@@ -32,6 +32,10 @@ class RecipeError(PatternError):
     """A recipe that cannot be understood, or whose values contradict one another."""
 
 
+class FieldError(PatternError):
+    """A field that asks for something that is not there: an attribute, a UV map, an image, an object."""
+
+
 class BaseError(PatternError):
     """A base geometry that cannot be read, or that no solid can be made of."""
 

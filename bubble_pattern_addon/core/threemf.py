@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import posixpath
 import zipfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 from xml.etree import ElementTree
 from xml.sax.saxutils import quoteattr
@@ -25,10 +27,14 @@ START = "3D/3dmodel.model"
 
 
 class Piece(NamedTuple):
-    """Part of a base file: a mesh and, per triangle, the name of its material ("" for none), (T,) str."""
+    """Part of a base file: a mesh and, per triangle, the name of its material ("" for none), (T,) str; what
+    is painted on it by name, (T,), (T, 3) or (T, 3, channels), and UV maps, (T, 3, 2).
+    """
 
     mesh: Mesh
     material: np.ndarray[tuple[int], np.dtype[np.str_]]
+    values: Mapping[str, Floats] = MappingProxyType({})
+    uv_maps: Mapping[str, Floats] = MappingProxyType({})
 
 
 @dataclass(frozen=True)

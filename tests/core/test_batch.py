@@ -162,7 +162,7 @@ def test_material_and_attribute_choose_the_region(run, tmp_path: Path) -> None:
     assert len((folder / "features.csv").read_bytes().splitlines()) == len(by_attribute.splitlines())
 
 
-LIMITS = "[limits]\nmin_margin = 1.5\n"
+LIMITS = "[limits]\nmin_margin = 1.5\nmin_diameter = 1.9\n"
 BAD = {
     "missing base": (GRILLE, Path("nowhere.stl"), "does not exist"),
     "no base": (GRILLE, None, "add --base MODEL"),
@@ -177,7 +177,12 @@ BAD = {
     "face without area": (GRILLE, with_flat_face(plate()), "area"),
     "pitch over region": (TOP + "[packing]\npitch = 90\n", plate(), "pitch"),
     "a million features": (TOP + "[packing]\npitch = 0.01\n", plate(), "more than 1,000,000"),
-    "margin": (GRILLE + LIMITS, plate(), "raise edge_offset by"),
+    "no feature left": (GRILLE + LIMITS.replace("1.5", "15"), plate(), "No feature is left"),
+    "an attribute that is not there": (
+        TOP + '[packing]\npitch = { kind = "attribute", name = "x", from = 1, to = 2 }\n',
+        plate(),
+        '[packing] pitch: name = "x": the base has no attribute',
+    ),
     "too thick": (GRILLE.replace("2]", "100]"), trimesh.creation.box((40, 30, 200)), "too thick to pierce"),
 }
 

@@ -12,12 +12,12 @@ from hypothesis.extra import numpy as arrays
 from scipy.spatial import Voronoi
 from scipy.spatial.transform import Rotation
 
+from bubble_pattern_addon.core.distance import boundary_distance
 from bubble_pattern_addon.core.mesh import Floats, Mesh
 from bubble_pattern_addon.core.metric import Places
 from bubble_pattern_addon.core.pattern import Pattern
 from bubble_pattern_addon.core.quality import (
     REACH,
-    boundary_distance,
     measure,
     measure_points,
     min_margin,
