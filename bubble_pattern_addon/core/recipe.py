@@ -37,6 +37,7 @@ from .toml_values import (
 )
 
 INTEGRATORS = ("fire", "rk4")
+ORIENTATIONS = ("edge", "best")
 SOLVERS = ("direct", "iterate")
 KINDS = ("hole",)
 FORMATS = ("stl", "obj", "ply", "3mf", "glb")
@@ -59,11 +60,16 @@ class RegionChoice:
 
 @dataclass(frozen=True)
 class Packing:
-    """Step 1. pitch is the packing metric: the distance of neighbouring centres."""
+    """Step 1. pitch is the packing metric: the distance of neighbouring centres.
+
+    orientation: where the rows of the arrangement run, "edge" (along the longest straight stretch of the
+    boundary), a vector, or "best" (several directions are tried)
+    """
 
     pitch: Described = Constant(3.0)
     edge_offset: float = 0.0
     integrator: str = "fire"
+    orientation: str | Point = "edge"
     seed: int = 0
     iterations: int = 60
     tolerance: float = 1e-3
@@ -264,6 +270,10 @@ def _refuse_unknown(data: Mapping[str, Any]) -> None:
 # -- readers: the right type or a RecipeError that names the key ---------------------------------------------
 
 
+def _orientation(value: object, where: str) -> str | Point:
+    return point(value, where) if isinstance(value, list) else text(value, where)
+
+
 def _fill(value: object, where: str) -> Fill:
     return Fill(field_from_toml(value, where))
 
@@ -292,6 +302,7 @@ READERS: dict[str, dict[str, Callable[[object, str], Any]]] = {
     "packing": {
         "pitch": field_from_toml,
         "edge_offset": number,
+        "orientation": _orientation,
         "integrator": text,
         "seed": whole,
         "iterations": whole,
@@ -338,6 +349,10 @@ def check_recipe(recipe: Recipe) -> None:
     if asks_for_pitch(packing.pitch):
         raise RecipeError("[packing] pitch is given as a share of itself: fill goes with diameters")
     _check_shaping(recipe.shaping)
+    if isinstance(packing.orientation, str):
+        check_one_of(packing.orientation, ORIENTATIONS, "[packing] orientation")
+    elif not any(packing.orientation):
+        raise RecipeError("[packing] orientation = [0, 0, 0] is no direction: give a vector along the rows")
     check_one_of(packing.integrator, INTEGRATORS, "[packing] integrator")
     check_at_least(packing.seed, 0, "[packing] seed")
     check_at_least(packing.iterations, 1, "[packing] iterations")

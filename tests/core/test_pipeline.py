@@ -263,6 +263,26 @@ def test_another_seed_gives_another_arrangement_that_is_as_good() -> None:
     assert measure(pattern, region).gap_min > 0.85
 
 
+def test_rows_run_where_they_are_asked_to() -> None:
+    """In the middle of a disc, whose boundary has no straight stretch, all bubbles keep to the direction."""
+    shape = SHAPES["disc"]()
+    for degrees in (0.0, 20.0, 50.0):
+        way = (np.cos(np.radians(degrees)), np.sin(np.radians(degrees)), 0.0)
+        _, pattern = lay(shape.mesh, shape.selected, uniform(0.4, orientation=way))
+        middle = np.linalg.norm(pattern.position, axis=1) < 1.5
+        along = np.arctan2(pattern.tangent[middle, 1], pattern.tangent[middle, 0])
+        off = np.angle(np.exp(6j * (along - np.radians(degrees)))) / 6
+        assert np.degrees(np.abs(off)).max() < 2.0
+
+
+def test_the_best_of_several_directions_is_no_worse() -> None:
+    known = laid("trapezoid")
+    region, best = lay(known.shape.mesh, known.shape.selected, uniform(known.pitch, orientation="best"))
+    check_invariants(region, best, known.pitch)
+    one, other = (measure(pattern, region) for pattern in (best, known.pattern))
+    assert one.six + one.psi6 + one.gap_min >= other.six + other.psi6 + other.gap_min
+
+
 # -- what does not fit ---------------------------------------------------------------------------------------
 
 
