@@ -17,21 +17,25 @@ import bpy
 import numpy as np
 
 from ..core.errors import BaseError, OutputError
+from ..core.field_tables import Wanted
 from ..core.files import LoadedBase
 from ..core.mesh import Bools, Floats, Mesh
 from ..core.metric import Places
 from ..core.pattern import Pattern
 from ..core.quality import measure
+from .applying import place_part, verdict_of
 from .attributes import CORNER_VERTEX, MATERIAL, write_values
-from .generation import fill_settings, measured, place_part, put, read_source, verdict_of
+from .generation import fill_settings, measured, put, read_source
 from .marked_side import on_marked_side
 from .part_mesh import build_part_mesh
 from .pattern_object import new_pattern_object
 from .picture import render_part
+from .pixels import read_image as read_image
 from .properties import is_pattern, recipe_of
 from .provenance import Original, read_original
 from .reading import Base, evaluated_mesh, transformed
 from .reading import read_base as read_object
+from .surroundings import read_painted, with_things
 from .target_region import ATTRIBUTE, store
 
 if TYPE_CHECKING:
@@ -67,8 +71,9 @@ def registered() -> Iterator[None]:
 # -- in ------------------------------------------------------------------------------------------------------
 
 
-def read_base(path: Path | None) -> LoadedBase:
-    """The base in a .blend file, with its modifiers and in world coordinates; None: in the file that is open.
+def read_base(path: Path | None, names: Wanted) -> LoadedBase:
+    """The base in a .blend file, with its modifiers and in world coordinates, and of what is painted on it or
+    stands beside it what `names` asks for; None: in the file that is open.
 
     Raises BaseError where the file is no .blend, or which of its objects is meant cannot be told.
     """
@@ -82,8 +87,18 @@ def read_base(path: Path | None) -> LoadedBase:
         obj = base_object()
         with evaluated_mesh(obj, bpy.context.evaluated_depsgraph_get()) as mesh:
             base = read_object(obj, mesh, WORLD)
+            painted = read_painted(obj, mesh, base, replace(names, images=frozenset()))
+        around = with_things(painted, names, WORLD, bpy.context)
         marks = {name: on_marked_side(obj, base, name, mask) for name, mask in base.attributes.items()}
-    return BlendBase(base.mesh, marks, base.materials, obj.name)
+    return BlendBase(
+        base.mesh,
+        marks,
+        base.materials,
+        obj.name,
+        values=around.attributes,
+        uv_maps=around.uv_maps,
+        objects=around.objects,
+    )
 
 
 def base_object() -> bpy.types.Object:

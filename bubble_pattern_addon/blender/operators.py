@@ -173,10 +173,10 @@ class BUBBLE_PATTERN_OT_apply(OnPattern, SteppedOperator, bpy.types.Operator):
     bl_options = {'REGISTER', 'UNDO'}
 
     def steps(self, context: bpy.types.Context) -> Steps[Any]:
-        from . import generation
+        from . import applying
 
         yield Progress("Reading the base", 0.0)
-        result = yield from generation.apply_steps(current_pattern(context), context)
+        result = yield from applying.apply_steps(current_pattern(context), context)
         return result
 
     def done(self, context: bpy.types.Context, result: Any) -> None:

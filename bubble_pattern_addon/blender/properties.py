@@ -217,10 +217,14 @@ class BubblePatternSettings(bpy.types.PropertyGroup):
     # What came out of the last generation. -1 where nothing could be measured.
     made_with: StringProperty(options={'HIDDEN'})
     fingerprint: StringProperty(options={'HIDDEN'})
+    size_trace: StringProperty(options={'HIDDEN'})
     trouble: StringProperty(options={'HIDDEN'})
     version: IntProperty(options={'HIDDEN'})
     seconds: FloatProperty(options={'HIDDEN'})
     count: IntProperty(name="Features", description="Number of features", options={'HIDDEN'})
+    shrunk: IntProperty(options={'HIDDEN'})
+    dropped: IntProperty(options={'HIDDEN'})
+    notes: StringProperty(options={'HIDDEN'})
     six: FloatProperty(name="Order", subtype='FACTOR', min=-1.0, max=1.0, options={'HIDDEN'})
     gap_min: FloatProperty(name="Smallest Gap", options={'HIDDEN'})
     web: FloatProperty(name="Smallest Web", subtype='DISTANCE', options={'HIDDEN'})
@@ -289,7 +293,7 @@ def packing_text(recipe: Recipe) -> str:
 
 def recipe_text(recipe: Recipe) -> str:
     """What the pattern's points depend on, as text; how the features are cut is left out."""
-    return recipe_to_toml(replace(recipe, feature=Feature(), limits=Limits()))
+    return recipe_to_toml(replace(recipe, feature=Feature()))
 
 
 def length_text(context: bpy.types.Context, value: float) -> str:

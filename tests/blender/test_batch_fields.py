@@ -12,9 +12,9 @@ import pytest
 import trimesh
 
 from bubble_pattern_addon import batch
+from bubble_pattern_addon.blender.pixels import read_image
 from bubble_pattern_addon.core.errors import FieldError
 from bubble_pattern_addon.core.recipe import load_recipe
-from bubble_pattern_addon.pixels import read_image
 
 HALFTONE = (
     '[region]\nnear = [0, 0, 2]\n[packing]\npitch = 4\n[shaping.fill]\nkind = "image"\n'
