@@ -60,8 +60,8 @@ class Laid:
 
 @dataclass(frozen=True)
 class Source:
-    """A base as read for one pattern: geometry, region, the region's triangles as a mask (T,), what fields ask
-    for, and what tells whether any of them has changed: for the bubbles' places, and for their sizes.
+    """A base as read for one pattern: geometry, region, the region's triangles as a mask (T,), what fields
+    ask for, and what tells whether any of them has changed: for the bubbles' places, and for their sizes.
     """
 
     base: Base
