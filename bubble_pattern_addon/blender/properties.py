@@ -34,7 +34,8 @@ from ..core.recipe import (
     check_recipe,
     recipe_to_toml,
 )
-from .field_properties import SIZE, BubblePatternField, described, length_property, point_of, take, typed
+from .field_properties import SIZE, BubblePatternField, length_property, point_of, typed
+from .field_recipe import described, take
 
 # Raised when a property changes its meaning; see upgrade.
 SETTINGS_VERSION = 2
