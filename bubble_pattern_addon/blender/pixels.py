@@ -23,17 +23,22 @@ def read_image(name: str, folder: Path) -> Floats:
         if known is None:
             raise FieldError(f"Image {path} does not exist: check the path, which is seen from the recipe")
         return pixels_of(known, name)
+    image = load_image(path)
+    try:
+        return pixels_of(image, name)
+    finally:
+        bpy.data.images.remove(image)
+
+
+def load_image(path: Path) -> bpy.types.Image:
+    """The image in a file, taken into the open one. Raises FieldError where it cannot be read."""
     try:
         image = bpy.data.images.load(str(path.resolve()), check_existing=False)
     except RuntimeError as error:
         reason = " ".join(str(error).removeprefix("Error: ").split())
         raise FieldError(f"Image {path} can't be read ({reason}): save it as PNG") from None
-    try:
-        # colours as they are, not multiplied by alpha
-        image.alpha_mode = 'CHANNEL_PACKED'
-        return pixels_of(image, name)
-    finally:
-        bpy.data.images.remove(image)
+    image.alpha_mode = 'CHANNEL_PACKED'  # colours as they are, not multiplied by alpha
+    return image
 
 
 def pixels_of(image: bpy.types.Image, name: str = "") -> Floats:
