@@ -653,7 +653,15 @@ def test_the_sidebar_shows_what_a_kind_needs() -> None:
         drawn = []
         cls.draw(SimpleNamespace(layout=Layout(drawn), fields=()), bpy.context)
         assert drawn
-    assert {"bubble_pattern.fix_sizes", "bubble_pattern.free_sizes", "diameter_mode"} <= set(drawn)
+    assert {"bubble_pattern.edit_sizes", "diameter_mode"} <= set(drawn)
+    assert bpy.ops.bubble_pattern.edit_sizes() == {'FINISHED'}
+    assert pattern.mode == 'EDIT'
+    assert bpy.context.active_object == pattern
+    assert tuple(bpy.context.tool_settings.mesh_select_mode) == (True, False, False)
+    drawn = []
+    main = SimpleNamespace(layout=Layout(drawn), draw_points=panels.BUBBLE_PATTERN_PT_main.draw_points)
+    main.draw_points(main, main.layout, settings)
+    assert drawn == ["bubble_pattern.fix_sizes", "bubble_pattern.free_sizes"]
 
 
 def test_names_and_tooltips_of_fields_are_as_blender_has_them() -> None:
