@@ -381,3 +381,33 @@ def test_any_plate_keeps_the_laws(plate: tuple[list[Floats], float], triangles: 
     part = drive(part_steps(solid, pattern, Feature(sides=16)))
     assert part.check.problems == ()
     assert (part.check.base_euler, part.check.euler) == (base_euler, base_euler - 2 * len(pattern))
+
+
+# -- sub-regions ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("gap", [0.0, 1.5])
+def test_sub_regions_have_a_first_row_each_and_their_gap_between(gap: float) -> None:
+    """A square whose middle is a sub-region: rows on both sides of its border, the gap between them."""
+    pitch = 2.0
+    inner, outer = shapes.rectangle_outline(24, 24)[0], shapes.rectangle_outline(60, 60)[0]
+    sheet = shapes.fine_sheet([outer, inner[::-1]], 2.0)
+    core_sheet = shapes.fine_sheet([inner], 2.0)
+    count = len(sheet.vertices)
+    mesh = Mesh(
+        np.concatenate([sheet.vertices, core_sheet.vertices]),
+        np.concatenate([sheet.triangles, core_sheet.triangles + count]),
+    )
+    parts = np.repeat([0, 1], [len(sheet.triangles), len(core_sheet.triangles)])
+    region = make_region(mesh, np.ones(len(mesh.triangles), bool), parts, gap)
+    pattern = drive(pattern_steps(region, uniform(pitch)))
+    beyond = np.abs(pattern.position[:, :2]) - 12.0
+    outside = np.linalg.norm(np.maximum(beyond, 0), axis=1)
+    depth = np.where(outside > 0, outside, beyond.max(axis=1))
+    assert (np.abs(depth) >= (pitch + gap) / 2 - 2e-2 * pitch).all()
+    on_border = np.abs(np.abs(depth) - (pitch + gap) / 2) < 2e-2 * pitch
+    # both rows stand along the whole border
+    assert on_border[depth < 0].sum() == pytest.approx(4 * (24 - pitch - gap) / pitch, abs=4)
+    assert on_border[depth > 0].sum() == pytest.approx(4 * (24 + pitch + gap) / pitch, abs=8)
+    assert (pattern.row[on_border] == 0).all()
+    assert min_web(pattern) > 0.2 * pitch
