@@ -2,12 +2,12 @@
 
     python3 scripts/gallery.py [--out DIR] [--only NAME] [--quick]
 
-Makes its own environment on first use. Every result gets a folder in DIR (default: out/gallery), which then holds
+Makes its own environment on first use. Every result gets a folder in DIR (default: out/gallery) with
 
     base.blend      the base, its target region and sub-regions marked
     recipe.toml     the recipe (from scripts/gallery), every value written out
-    pattern.blend   opens with the pattern editable, and the part; where the sidebar cannot show the recipe yet,
-                    part.blend with base and part instead
+    pattern.blend   opens with the pattern editable, and the part; where the sidebar cannot show the
+                    recipe, part.blend with base and part instead
     part.stl, features.csv, report.json, part.png
 
 Beside the folders stand small pictures, NAME.jpg, and all of them on one sheet, contact_sheet.jpg.
@@ -227,7 +227,7 @@ def read_picture(path: Path, size: tuple[int, int]) -> Floats:
         image.pixels.foreach_get(pixels)
     finally:
         bpy.data.images.remove(image)
-    return pixels.reshape(size[1], size[0], 4)
+    return pixels.reshape(size[1], size[0], 4).astype(np.float64)
 
 
 def write_jpeg(path: Path, pixels: Floats, quality: int) -> None:
@@ -237,7 +237,7 @@ def write_jpeg(path: Path, pixels: Floats, quality: int) -> None:
     height, width = pixels.shape[:2]
     image = bpy.data.images.new(path.stem, width, height)
     try:
-        image.pixels.foreach_set(pixels.ravel())
+        image.pixels.foreach_set(pixels.astype(np.float32).ravel())
         image.file_format = 'JPEG'
         image.save(filepath=str(path), quality=quality)
     finally:

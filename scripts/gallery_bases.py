@@ -24,9 +24,8 @@ FINISHES: Mapping[str, Mapping[str, Any]] = {
     "Black plastic": {"color": (0.018, 0.019, 0.021), "roughness": 0.42, "grain": 0.03, "grain_size": 0.5},
     "Anthracite": {"color": (0.045, 0.048, 0.054), "roughness": 0.40},
     "Light plastic": {"color": (0.56, 0.57, 0.57), "roughness": 0.45, "grain": 0.02, "grain_size": 0.5},
-    "Aluminium": {"color": (0.30, 0.31, 0.33), "metallic": 0.8, "roughness": 0.40},
-    "Dark aluminium": {"color": (0.10, 0.105, 0.115), "metallic": 0.75, "roughness": 0.40},
-    "Bronze": {"color": (0.26, 0.20, 0.15), "metallic": 0.8, "roughness": 0.40},
+    "Aluminium": {"color": (0.36, 0.37, 0.39), "metallic": 0.8, "roughness": 0.40},
+    "Bronze": {"color": (0.34, 0.27, 0.21), "metallic": 0.8, "roughness": 0.40},
     "Chrome": {"color": (0.62, 0.63, 0.65), "metallic": 1.0, "roughness": 0.2},
     "Display": {"color": (0.004, 0.005, 0.007), "roughness": 0.12},
     "Keys": {"color": (0.20, 0.21, 0.225), "roughness": 0.5},
@@ -106,11 +105,11 @@ def coupe_speaker() -> GalleryBase:
     """Result 2: a round centre over the cone, and surroundings to its left and right."""
     region = rounded(np.array([[-108.0, -50.0], [100.0, -58.0], [112.0, 52.0], [-92.0, 58.0]]), 44.0)
     centre = circle(42.0, (4.0, 0.0))
-    rings = (-9.0, -7.5, -6.0, -4.5, -3.0, -1.5, 1.5, 3.0)
+    rings = (-12.0, -10.5, -9.0, -7.5, -6.0, -4.5, -3.0, -1.5, 1.5, 3.0)
     cover = _speaker(
         region,
         [Contour(centre, rings)],
-        lambda flat: 2.2 * smooth((44 - np.linalg.norm(flat - [4.0, 0.0], axis=1)) / 12),
+        lambda flat: 3.2 * smooth((44 - np.linalg.norm(flat - [4.0, 0.0], axis=1)) / 13),
     )
     grille, inner = cover.within(region), cover.within(centre)
     left = np.zeros_like(grille)
@@ -120,7 +119,7 @@ def coupe_speaker() -> GalleryBase:
         cover.mesh,
         grille,
         "Black plastic",
-        {"Dark aluminium": grille},
+        {"Bronze": grille},
         {"centre": inner, "left": around & left, "right": around & ~left},
     )
 
@@ -166,7 +165,7 @@ def conference_station() -> GalleryBase:
         cover.mesh,
         region,
         "Black plastic",
-        {"Dark aluminium": region, "Chrome": _all(*map(cover.within, buttons))},
+        {"Aluminium": region, "Keys": _all(*map(cover.within, buttons))},
         parts,
     )
 
@@ -248,21 +247,21 @@ def _receiver(x: float, form: Callable[[Floats], Floats]) -> Mesh:
 def printer_panel() -> GalleryBase:
     """Result 6: the side of a laser printer, with vents over the fuser and a grip sunk below them."""
     outline = _box(0, 0, 380, 270, 24)
-    vents = rounded(np.array([[-150.0, -6.0], [148.0, -6.0], [148.0, 100.0], [-104.0, 100.0]]), 22.0)
-    grip = _box(78, -74, 140, 42, 18)
+    vents = rounded(np.array([[-152.0, -22.0], [150.0, -22.0], [150.0, 100.0], [-96.0, 100.0]]), 22.0)
+    grip = _box(84, -84, 130, 40, 19)
     badge = rounded(np.array([[-150.0, -102], [-96.0, -102], [-96.0, -92], [-150.0, -92]]), 3.0, 16)
 
     def form(flat: Floats) -> Floats:
         x, y = flat.T
         crown = -(x**2) / 5200 - y**2 / 3400
-        return crown + _bead(beyond(flat, vents), 2.2) - 9 * smooth((-beyond(flat, grip) + 4) / 22)
+        return crown + _bead(beyond(flat, vents), 2.2) - 8 * smooth((-beyond(flat, grip) + 1) / 14)
 
     def detail(flat: Floats) -> Floats:
         return 0.9 * smooth(-beyond(flat, badge) / 2.2)
 
     contours = [
         Contour(vents, BEAD),
-        Contour(grip, (-18, -15, -12, -9, -6, -3, 3, 6)),
+        Contour(grip, (-15, -13, -11, -9, -7, -5, -3, -1.5, 1.5)),
         Contour(badge, (-2.2, -1.5, -0.8, 1.2)),
     ]
     cover = mould(outline, contours, form, detail, edge=Edge(10, -34), fill=5)

@@ -14,6 +14,7 @@ from scipy.spatial import Delaunay, cKDTree
 from bubble_pattern_addon.core.mesh import Bools, Floats, Ints, Mesh
 from scripts.shapes import doubled_areas, inside_outline
 
+THICKNESS = 2.5
 STEP = 1.5
 """Distance of vertices along contours."""
 CLEAR = 0.5
@@ -62,7 +63,7 @@ def mould(
     detail: Callable[[Floats], Floats] | None = None,
     *,
     edge: Edge = Edge(),
-    thickness: float = 2.5,
+    thickness: float = THICKNESS,
     fill: float = 4.0,
 ) -> Cover:
     """A closed shell of even thickness under a top with this outline (k, 2), counter-clockwise.
