@@ -27,7 +27,7 @@ from .generation import fill_settings, measured, place_part, put, read_source, v
 from .marked_side import on_marked_side
 from .part_mesh import build_part_mesh
 from .pattern_object import new_pattern_object
-from .picture import render_part
+from .picture import SIZE, render_part
 from .properties import is_pattern, recipe_of
 from .provenance import Original, read_original
 from .reading import Base, evaluated_mesh, transformed
@@ -133,12 +133,15 @@ def write_blend(path: Path, run: Run) -> None:
             raise OutputError(f"{path.name} can't be written: {str(error).removeprefix('Error: ')}") from None
 
 
-def write_picture(path: Path, run: Run) -> None:
-    """A rendered view of the part as PNG, looking at the pattern. Raises OutputError where that fails."""
+def write_picture(path: Path, run: Run, size: tuple[int, int] = SIZE, up: Floats | None = None) -> None:
+    """A rendered view of the part as PNG, looking at the pattern. Raises OutputError where that fails.
+
+    size, up: see render_part
+    """
     with registered():
         base_obj, base, original = stand_base(run)
         mesh = build_part_mesh(f"{base_obj.name} Part", run.part, run.pattern.places, base, original)
-        render_part(path, mesh, np.array(base_obj.matrix_world), run.pattern)
+        render_part(path, mesh, np.array(base_obj.matrix_world), run.pattern, size, up)
 
 
 def stand_base(run: Run) -> tuple[bpy.types.Object, Base, Original]:
