@@ -76,7 +76,7 @@ def _pair_up(ranked: Ints) -> bool:
 
 
 def is_closed(triangles: Ints) -> bool:
-    """Is every edge shared by exactly two triangles that run along it in opposite directions?"""
+    """Is every edge shared by exactly two of `triangles`, (T, 3), that run along it in opposite ways?"""
     return _pair_up(np.sort(edge_keys(triangles)[0]))
 
 

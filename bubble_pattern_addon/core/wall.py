@@ -180,6 +180,7 @@ def disc_spans(local: Floats, radius: Floats) -> Spans:
     low, high = np.full(len(local), np.inf), np.full(len(local), -np.inf)
 
     def take(heights: Floats, valid: Bools) -> None:
+        """Widen each span to those of its `heights` that are `valid`, both (k, m)."""
         np.minimum(low, np.where(valid, heights, np.inf).min(axis=0), out=low)
         np.maximum(high, np.where(valid, heights, -np.inf).max(axis=0), out=high)
 
