@@ -17,7 +17,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import BaseError, OutputError
-from ..core.field_tables import Wanted, wanted, with_images
+from ..core.field_tables import NO_NAMES, Wanted, wanted, with_images
 from ..core.files import LoadedBase
 from ..core.mesh import Bools, Floats, Mesh
 from ..core.metric import Places
@@ -31,7 +31,7 @@ from .generation import fill_settings, measured, put, read_source
 from .marked_side import on_marked_side
 from .part_mesh import build_part_mesh
 from .pattern_object import new_pattern_object
-from .picture import render_part
+from .picture import SIZE, render_part
 from .pixels import load_image
 from .pixels import read_image as read_image
 from .properties import is_pattern, recipe_of
@@ -74,7 +74,7 @@ def registered() -> Iterator[None]:
 # -- in ------------------------------------------------------------------------------------------------------
 
 
-def read_base(path: Path | None, names: Wanted) -> LoadedBase:
+def read_base(path: Path | None, names: Wanted = NO_NAMES) -> LoadedBase:
     """The base in a .blend file, with its modifiers and in world coordinates, and of what is painted on it or
     stands beside it what `names` asks for; None: in the file that is open.
 
@@ -173,12 +173,15 @@ def with_images_in(run: Run) -> Recipe:
     )
 
 
-def write_picture(path: Path, run: Run) -> None:
-    """A rendered view of the part as PNG, looking at the pattern. Raises OutputError where that fails."""
+def write_picture(path: Path, run: Run, size: tuple[int, int] = SIZE, up: Floats | None = None) -> None:
+    """A rendered view of the part as PNG, looking at the pattern. Raises OutputError where that fails.
+
+    size, up: see render_part
+    """
     with registered():
         base_obj, base, original = stand_base(run)
         mesh = build_part_mesh(f"{base_obj.name} Part", run.part, run.pattern.places, base, original)
-        render_part(path, mesh, np.array(base_obj.matrix_world), run.pattern)
+        render_part(path, mesh, np.array(base_obj.matrix_world), run.pattern, size, up)
 
 
 def stand_base(run: Run) -> tuple[bpy.types.Object, Base, Original]:

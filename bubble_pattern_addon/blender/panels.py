@@ -182,6 +182,9 @@ class BUBBLE_PATTERN_PT_packing(SettingsPanel, bpy.types.Panel):
         if settings.orientation == 'GIVEN':
             column.prop(settings, "rows_along", text=" ")
         column.prop(settings, "seed")
+        column.prop(settings, "parts")
+        if settings.parts:
+            column.prop(settings, "gap")
 
 
 class BUBBLE_PATTERN_PT_solver(SettingsPanel, bpy.types.Panel):

@@ -49,13 +49,19 @@ NEAT = (1, 1.1, 1.2, 1.4, 1.6, 1.8, 2, 2.2, 2.5, 2.8, 3, 3.5, 4, 4.5, 5, 5.5, 6,
 
 @dataclass(frozen=True)
 class RegionChoice:
-    """Which faces of the base are the target region: exactly one of near, attribute, material and all."""
+    """Which faces of the base are the target region: exactly one of near, attribute, material and all.
+
+    parts: face attributes or materials whose faces are sub-regions with a first row of their own along their
+    border (what none of them names is one more); gap: what stays free between neighbouring sub-regions
+    """
 
     near: Point | None = None
     max_angle: float = 20.0
     attribute: str | None = None
     material: str | None = None
     all: bool = False
+    parts: tuple[str, ...] = ()
+    gap: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -298,7 +304,15 @@ def _seed(table: Mapping[str, object], where: str) -> Seed:
 
 
 READERS: dict[str, dict[str, Callable[[object, str], Any]]] = {
-    "region": {"near": point, "max_angle": number, "attribute": text, "material": text, "all": flag},
+    "region": {
+        "near": point,
+        "max_angle": number,
+        "attribute": text,
+        "material": text,
+        "all": flag,
+        "parts": texts,
+        "gap": number,
+    },
     "packing": {
         "pitch": field_from_toml,
         "edge_offset": number,
@@ -337,6 +351,9 @@ def check_choice(choice: RegionChoice) -> None:
         raise RecipeError(f"[region] chooses faces in {len(ways)} ways ({', '.join(ways)}): keep one of them")
     if not 0 <= choice.max_angle <= 180:
         raise RecipeError(f"[region] max_angle = {choice.max_angle:g} must be from 0 to 180 degrees")
+    check_at_least(choice.gap, 0, "[region] gap")
+    if choice.gap and not choice.parts:
+        raise RecipeError("[region] gap goes between parts: name these too, or leave gap out")
 
 
 def check_recipe(recipe: Recipe) -> None:

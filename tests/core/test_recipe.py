@@ -156,6 +156,7 @@ BAD = {
     "iterations broken": ("[packing]\niterations = 1.5", "whole number"),
     "seed": ("[packing]\nseed = -1", "at least 0"),
     "tolerance": ("[packing]\ntolerance = 0", "above 0"),
+    "gap without parts": ("[region]\nall = true\ngap = 2.0", "name these too"),
     "orientation": ("[packing]\norientation = 'bets'", 'did you mean "best"'),
     "orientation that is none": ("[packing]\norientation = [0, 0, 0]", "no direction"),
     "integrator": ("[packing]\nintegrator = 'rk5'", 'did you mean "rk4"'),

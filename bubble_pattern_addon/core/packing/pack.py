@@ -44,6 +44,9 @@ LONG_ENOUGH = 6.0
 TOO_CLOSE = 0.8
 # Directions that are tried for the best arrangement, in degrees; sixty mean the same lattice.
 TURNS = (0.0, 15.0, 30.0, 45.0)
+# Where nothing holds the bubbles together they are packed at this share of the pitch that would fill the
+# surface exactly.
+CRAMPED = 1.02
 # Rounds of relaxation and population control, and how many steps each may take; the last phases' steps.
 ROUNDS = 3
 STIFF_STEPS = 45
@@ -107,19 +110,32 @@ def _settled(
         yield Progress("Packing the bubbles", 0.2 + 0.2 * number)
         local = local_pitch(ground, bubbles)
         settle = relax if packing.integrator == "fire" else integrate
-        bubbles, _ = settle(ground, bubbles, local, packing.iterations, packing.tolerance)
+        bubbles, _ = settle(ground, bubbles, _filling(ground, local), packing.iterations, packing.tolerance)
         bubbles, changed = control(ground, bubbles, local)
         if not changed:
             break
     yield Progress("Evening out the gaps", 0.8)
     while True:
         local = local_pitch(ground, bubbles)
-        bubbles, _ = relax(ground, bubbles, local, STIFF_STEPS, packing.tolerance, stiff_law, 1.0 + STIFFNESS)
+        size, stiffness = _filling(ground, local), 1.0 + STIFFNESS
+        bubbles, _ = relax(ground, bubbles, size, STIFF_STEPS, packing.tolerance, stiff_law, stiffness)
         kept = ~pressed_out(ground, bubbles, local_pitch(ground, bubbles))
         if kept.all():
             return bubbles
         # What stiff contacts have squeezed through the first row has no place between it and the boundary.
         bubbles = Bubbles(bubbles.spots.take(kept), bubbles.fixed)
+
+
+def _filling(ground: Ground, local: Floats) -> Floats:
+    """The pitches (n,) at which n bubbles of the `local` ones fill a surface without a boundary.
+
+    Nothing holds them together there: whoever is missing for a full arrangement would leave the others loose
+    and uneven.
+    """
+    if ground.boundary is not None:
+        return local
+    room = ground.charts.region.area / (np.sqrt(0.75) * (local**2).sum())
+    return local * max(CRAMPED * np.sqrt(room), 1.0)
 
 
 def local_pitch(ground: Ground, bubbles: Bubbles) -> Floats:
