@@ -12,9 +12,10 @@ from ..core.solid import Part, part_steps
 from .generation import read_source, show_part, update_steps
 from .part_mesh import build_part_mesh
 from .pattern_object import read_pattern
-from .properties import in_scene, is_outdated, pattern_objects, recipe_of
+from .properties import in_scene, pattern_objects
 from .provenance import Original, read_original
 from .reading import Base, evaluated_mesh, read_base, shown
+from .settings_recipe import is_outdated, recipe_of
 
 
 def apply_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[tuple[bpy.types.Object, Part]]:

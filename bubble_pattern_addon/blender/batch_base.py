@@ -34,10 +34,11 @@ from .pattern_object import new_pattern_object
 from .picture import SIZE, render_part
 from .pixels import load_image
 from .pixels import read_image as read_image
-from .properties import is_pattern, recipe_of
+from .properties import is_pattern
 from .provenance import Original, read_original
 from .reading import Base, evaluated_mesh, transformed, world_frame
 from .reading import read_base as read_object
+from .settings_recipe import recipe_of
 from .surroundings import read_painted, with_things
 from .target_region import ATTRIBUTE, store, stored
 

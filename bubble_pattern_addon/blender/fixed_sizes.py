@@ -18,7 +18,8 @@ from ..core.progress import drive
 from .attributes import read_values
 from .field_properties import length_property, point_of, typed
 from .operators import OnPattern, current_pattern, poll_pattern, refused
-from .properties import is_pattern, spoken
+from .properties import is_pattern
+from .settings_recipe import spoken
 
 
 class SizesOperator:

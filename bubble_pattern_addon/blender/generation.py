@@ -29,17 +29,9 @@ from ..core.surroundings import Surroundings
 from .marked_side import on_marked_side
 from .pattern_object import read_pattern, write_pattern, write_sizes
 from .preview_nodes import show_preview
-from .properties import (
-    SETTINGS_VERSION,
-    in_scene,
-    packing_text,
-    pattern_objects,
-    recipe_of,
-    recipe_text,
-    spoken,
-    take_recipe,
-)
+from .properties import SETTINGS_VERSION, in_scene, pattern_objects
 from .reading import Base, evaluated_mesh, read_base, shown
+from .settings_recipe import packing_text, recipe_of, recipe_text, spoken, take_recipe
 from .surroundings import both, read_painted, trace, with_things
 
 # A pattern that took longer than this is not laid anew at every change of a setting.

@@ -13,7 +13,8 @@ from bpy.props import BoolProperty, FloatProperty
 
 from ..core.progress import Progress, Steps
 from .field_properties import length_property, typed
-from .properties import in_scene, is_pattern, pattern_objects, pattern_of, recipe_of
+from .properties import in_scene, is_pattern, pattern_objects, pattern_of
+from .settings_recipe import recipe_of
 from .stepping import SteppedOperator
 from .target_region import free_name, selected_faces, store, stored, trying_region, wanted_faces
 

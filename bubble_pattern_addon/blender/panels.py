@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import bpy
 
 from .field_panels import draw_field
-from .properties import in_scene, is_outdated, is_pattern, length_text, pattern_objects, pattern_of
+from .properties import in_scene, is_pattern, pattern_objects, pattern_of
+from .settings_recipe import is_outdated, length_text
 
 
 class SidebarPanel:

@@ -10,7 +10,7 @@ import bpy
 
 from ..core.errors import PatternError
 from ..core.progress import Progress, Steps, drive
-from .properties import spoken
+from .settings_recipe import spoken
 
 # So long Blender may stand still between two looks at the keyboard, in seconds.
 SLICE = 0.08

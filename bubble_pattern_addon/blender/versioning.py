@@ -10,7 +10,8 @@ from bpy.app.handlers import persistent
 from ..core.errors import PatternError
 from ..core.recipe import recipe_from_dict
 from .preview_nodes import VERSION, VERSION_KEY, show_preview
-from .properties import SETTINGS_VERSION, is_pattern, recipe_of, recipe_text
+from .properties import SETTINGS_VERSION, is_pattern
+from .settings_recipe import recipe_of, recipe_text
 
 
 def upgrade_settings(settings: bpy.types.PropertyGroup) -> None:

@@ -13,7 +13,7 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="needs the bpy module: python scripts/test.py --blender VERSION")
 
 from bubble_pattern_addon import batch  # noqa: E402
-from bubble_pattern_addon.blender import batch_base, command, properties  # noqa: E402
+from bubble_pattern_addon.blender import batch_base, command, properties, settings_recipe  # noqa: E402
 from bubble_pattern_addon.core.files import write_mesh  # noqa: E402
 from bubble_pattern_addon.core.mesh import Mesh  # noqa: E402
 
@@ -61,7 +61,7 @@ def check_editable(pattern: bpy.types.Object, count: int) -> None:
     """The pattern is as it was made, can be edited, and gives the part again."""
     settings = pattern.bubble_pattern
     assert settings.count == count == len(pattern.data.vertices)
-    assert not properties.is_outdated(settings)
+    assert not settings_recipe.is_outdated(settings)
     part = settings.part
     assert is_closed(part.data)
     assert part.visible_get()

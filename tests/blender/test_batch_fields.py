@@ -13,7 +13,7 @@ import trimesh
 from mathutils import Euler, Matrix
 
 from bubble_pattern_addon import batch
-from bubble_pattern_addon.blender import properties
+from bubble_pattern_addon.blender import settings_recipe
 from bubble_pattern_addon.blender.pixels import read_image
 from bubble_pattern_addon.core.errors import FieldError
 from bubble_pattern_addon.core.recipe import load_recipe
@@ -113,7 +113,7 @@ def pattern_in(folder: Path) -> bpy.types.Object:
     """The pattern in the .blend that a run left behind, up to date."""
     bpy.ops.wm.open_mainfile(filepath=str(folder / "pattern.blend"))
     (pattern,) = [obj for obj in bpy.data.objects if obj.bubble_pattern.base is not None]
-    assert not properties.is_outdated(pattern.bubble_pattern)
+    assert not settings_recipe.is_outdated(pattern.bubble_pattern)
     return pattern
 
 

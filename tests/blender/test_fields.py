@@ -14,7 +14,14 @@ bpy = pytest.importorskip("bpy", reason="needs the bpy module: python scripts/te
 
 from mathutils import Euler, Matrix, Vector  # noqa: E402
 
-from bubble_pattern_addon.blender import field_panels, generation, panels, properties  # noqa: E402
+from bubble_pattern_addon.blender import (  # noqa: E402
+    field_panels,
+    field_properties,
+    generation,
+    panels,
+    properties,
+    settings_recipe,
+)
 from bubble_pattern_addon.core.blending import Fill, Most  # noqa: E402
 from bubble_pattern_addon.core.field_tables import field_from_toml  # noqa: E402
 from bubble_pattern_addon.core.metric import Constant  # noqa: E402
@@ -231,7 +238,7 @@ def test_every_kind_gives_the_values_of_its_formula(kind: Callable[[Any], np.nda
     assert share.min() < 0.2
     assert share.max() > 0.8
     assert np.allclose(sizes(pattern), SMALL + (LARGE - SMALL) * share, atol=2e-7)
-    assert not properties.is_outdated(settings)
+    assert not settings_recipe.is_outdated(settings)
 
 
 def test_a_mesh_is_measured_on_its_faces() -> None:
@@ -271,7 +278,7 @@ def test_what_is_not_chosen_yet_is_asked_for() -> None:
         settings.diameter_field.kind = kind
         assert settings.trouble.startswith("Diameter follows")
         assert asked in settings.trouble
-        assert properties.is_outdated(settings)
+        assert settings_recipe.is_outdated(settings)
     settings.diameter_field.attribute = "nothing"
     settings.diameter_field.kind = 'ATTRIBUTE'
     assert "no attribute of that name" in settings.trouble
@@ -351,7 +358,7 @@ def test_a_recipe_goes_to_the_settings_and_back(table: Any) -> None:
             packing=Packing(pitch=given, orientation=(0.0, 1.0, 0.25)),
             shaping=Shaping(diameter, seeds=(Seed((0.25, 0.5, 1.0), 0.002),), solver="iterate"),
         )
-        properties.take_recipe(settings, recipe)
+        settings_recipe.take_recipe(settings, recipe)
         constant = isinstance(given, Constant)
         wanted = {'CONSTANT'} if constant else {'RECIPE'} if table in KEPT_AS_TEXT else set(KIND_NAMES)
         assert settings.pitch_field.kind in wanted
@@ -374,8 +381,8 @@ def unchecked(settings: Any) -> Recipe:
     """The recipe of the settings, whether its values go together or not."""
     import unittest.mock
 
-    with unittest.mock.patch.object(properties, "check_recipe"):
-        return properties.recipe_of(settings)
+    with unittest.mock.patch.object(settings_recipe, "check_recipe"):
+        return settings_recipe.recipe_of(settings)
 
 
 def test_text_from_a_recipe_works_and_nonsense_is_told() -> None:
@@ -385,7 +392,7 @@ def test_text_from_a_recipe_works_and_nonsense_is_told() -> None:
     assert "Diameter" in settings.trouble
     set_field(pattern, text='{ kind = "max", of = [0.002, { kind = "radial", from = 0.001, to = 0.003 }] }')
     assert not settings.trouble
-    assert isinstance(properties.recipe_of(settings).shaping.diameter, Most)
+    assert isinstance(settings_recipe.recipe_of(settings).shaping.diameter, Most)
     assert sizes(pattern).min() == pytest.approx(0.002)
     assert sizes(pattern).max() > 0.0028
     set_field(pattern, text='{ kind = "lineal" }')
@@ -512,7 +519,7 @@ def test_fixed_sizes_stay_and_the_others_level_out() -> None:
     assert (made[between] > 0.001).all()
     assert (made[between] < 0.003).all()
     assert np.corrcoef(made[between], x[between])[0, 1] > 0.98
-    assert not properties.is_outdated(settings)
+    assert not settings_recipe.is_outdated(settings)
     # one of them again, in place of what it was
     one = np.arange(len(x)) == np.flatnonzero(left)[0]
     select_points(pattern, one)
@@ -577,12 +584,12 @@ def test_fields_and_fixed_sizes_are_saved(tmp_path: Path) -> None:
     bpy.ops.bubble_pattern.fix_sizes(diameter=0.002)
     bpy.ops.object.mode_set(mode='OBJECT')
     before = {name: sizes(pattern, name) for name in ("id", "diameter", "wished", "pitch")}
-    places, recipe = local(pattern), properties.recipe_of(settings)
+    places, recipe = local(pattern), settings_recipe.recipe_of(settings)
     prints = (settings.fingerprint, settings.size_trace)
     pattern = reopened(tmp_path)
     settings = pattern.bubble_pattern
-    assert properties.recipe_of(settings) == recipe
-    assert not properties.is_outdated(settings)
+    assert settings_recipe.recipe_of(settings) == recipe
+    assert not settings_recipe.is_outdated(settings)
     assert settings.diameter_field.object.name == "Target"
     bpy.context.view_layer.objects.active = pattern
     assert bpy.ops.bubble_pattern.update() == {'FINISHED'}
@@ -595,7 +602,7 @@ def test_fields_and_fixed_sizes_are_saved(tmp_path: Path) -> None:
 def test_a_file_of_the_first_version_opens_up_to_date(tmp_path: Path) -> None:
     pattern = add_on_top(plate())
     settings = pattern.bubble_pattern
-    pitch, diameter = properties.typed(settings.pitch), properties.typed(settings.diameter)
+    pitch, diameter = field_properties.typed(settings.pitch), field_properties.typed(settings.diameter)
     # as 0.1.0 wrote it
     settings.made_with = (
         '[region]\nmax_angle = 20.0\nattribute = "bubble_region"\nall = false\n\n'
@@ -610,13 +617,13 @@ def test_a_file_of_the_first_version_opens_up_to_date(tmp_path: Path) -> None:
     pattern = reopened(tmp_path)
     settings = pattern.bubble_pattern
     assert settings.version == properties.SETTINGS_VERSION
-    assert not properties.is_outdated(settings)
+    assert not settings_recipe.is_outdated(settings)
     settings.diameter *= 0.5
     assert np.array_equal(points(pattern), places)
     assert np.allclose(sizes(pattern, "diameter"), diameter / 2)
     # one that was not up to date is not called so
     settings.version, settings.made_with = 1, settings.made_with.replace("seed = 0", "seed = 1")
-    assert properties.is_outdated(reopened(tmp_path).bubble_pattern)
+    assert settings_recipe.is_outdated(reopened(tmp_path).bubble_pattern)
 
 
 # -- the panels ----------------------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="needs the bpy module: python scripts/test.py --blender VERSION")
 
-from bubble_pattern_addon.blender import preview_nodes, properties  # noqa: E402
+from bubble_pattern_addon.blender import preview_nodes, properties, settings_recipe  # noqa: E402
 
 from .parts import add_on_top, plate, points  # noqa: E402
 
@@ -36,7 +36,7 @@ def test_a_saved_pattern_opens_and_can_be_edited(tmp_path: Path) -> None:
     assert settings.edge_offset == pytest.approx(0.001)
     assert settings.count == count
     assert np.array_equal(points(pattern), places)
-    assert not properties.is_outdated(settings)
+    assert not settings_recipe.is_outdated(settings)
     bpy.context.view_layer.objects.active = pattern
     assert bpy.ops.bubble_pattern.update() == {'FINISHED'}
     assert np.array_equal(points(pattern), places)

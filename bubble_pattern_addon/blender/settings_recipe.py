@@ -1,0 +1,176 @@
+"""From a pattern's settings to the recipe, and back; and what is told of it in the sidebar's words."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from typing import Any
+
+import bpy
+
+from ..core.blending import Fill
+from ..core.errors import PatternError, RecipeError
+from ..core.metric import Constant, Described
+from ..core.recipe import (
+    Feature,
+    Limits,
+    Packing,
+    Recipe,
+    RegionChoice,
+    Seed,
+    Shaping,
+    check_recipe,
+    recipe_to_toml,
+)
+from .field_properties import point_of, typed
+from .field_recipe import described, take
+from .properties import BubblePatternSettings
+
+
+def recipe_of(settings: Any) -> Recipe:
+    """The recipe that `settings` stand for. Raises RecipeError where they contradict one another."""
+    through = settings.depth_mode == 'THROUGH'
+    recipe = Recipe(
+        region=RegionChoice(
+            attribute=settings.region or None,
+            parts=(parts := tuple(name.strip() for name in settings.parts.split(",") if name.strip())),
+            gap=typed(settings.gap) if parts else 0.0,
+        ),
+        packing=Packing(
+            pitch=described(settings.pitch_field, settings.pitch, False, "[packing] pitch"),
+            edge_offset=typed(settings.edge_offset),
+            orientation=(
+                point_of(settings.rows_along)
+                if settings.orientation == 'GIVEN'
+                else settings.orientation.lower()
+            ),
+            integrator=settings.integrator.lower(),
+            seed=settings.seed,
+            iterations=settings.iterations,
+            tolerance=typed(settings.tolerance),
+        ),
+        shaping=Shaping(
+            diameter=diameter_of(settings),
+            seeds=tuple(Seed(point_of(seed.at), typed(seed.diameter)) for seed in settings.seeds),
+            solver=settings.solver.lower(),
+            tolerance=typed(settings.shaping_tolerance),
+            iterations=settings.shaping_iterations,
+        ),
+        feature=Feature(
+            depth=None if through else typed(settings.depth),
+            sides=settings.sides or None,
+            tolerance=typed(settings.facet_tolerance) or None,
+        ),
+        limits=Limits(
+            min_web=typed(settings.min_web),
+            min_margin=typed(settings.min_margin),
+            min_diameter=typed(settings.min_diameter),
+        ),
+    )
+    check_recipe(recipe)
+    return recipe
+
+
+def diameter_of(settings: Any) -> Described:
+    """The shaping metric: a size, or a share of the pitch."""
+    if settings.diameter_mode == 'SHARE':
+        return Fill(described(settings.diameter_field, settings.fill, True, "[shaping] fill"))
+    return described(settings.diameter_field, settings.diameter, False, "[shaping] diameter")
+
+
+def take_recipe(settings: Any, recipe: Recipe) -> None:
+    """Set `settings` to what `recipe` says."""
+    live, settings.live = settings.live, False  # one change after the other would lay a pattern each time
+    settings.parts = ", ".join(recipe.region.parts)
+    settings.gap = recipe.region.gap
+    take_packing(settings, recipe.packing)
+    take_shaping(settings, recipe.shaping)
+    feature = recipe.feature
+    settings.depth_mode = 'THROUGH' if feature.depth is None else 'BLIND'
+    if feature.depth is not None:
+        settings.depth = feature.depth
+    settings.sides = feature.sides or 0
+    settings.facet_tolerance = feature.tolerance or 0.0
+    settings.min_web = recipe.limits.min_web
+    settings.min_margin = recipe.limits.min_margin
+    settings.min_diameter = recipe.limits.min_diameter
+    settings.live = live
+
+
+def take_packing(settings: Any, packing: Packing) -> None:
+    """Set the settings of step 1."""
+    if isinstance(packing.pitch, Constant):
+        settings.pitch_field.kind = 'CONSTANT'
+        settings.pitch = packing.pitch.value
+    else:
+        take(settings.pitch_field, packing.pitch, False)
+    settings.edge_offset = packing.edge_offset
+    if isinstance(packing.orientation, str):
+        settings.orientation = packing.orientation.upper()
+    else:
+        settings.orientation = 'GIVEN'
+        settings.rows_along = packing.orientation
+    settings.integrator = packing.integrator.upper()
+    settings.seed = packing.seed
+    settings.iterations = packing.iterations
+    settings.tolerance = packing.tolerance
+
+
+def take_shaping(settings: Any, shaping: Shaping) -> None:
+    """Set the settings of step 2."""
+    share = isinstance(shaping.diameter, Fill)
+    size = shaping.diameter.share if isinstance(shaping.diameter, Fill) else shaping.diameter
+    settings.diameter_mode = 'SHARE' if share else 'SIZE'
+    if isinstance(size, Constant):
+        settings.diameter_field.kind = 'CONSTANT'
+        setattr(settings, "fill" if share else "diameter", size.value)
+    else:
+        take(settings.diameter_field, size, share)
+    settings.seeds.clear()
+    for seed in shaping.seeds:
+        entry = settings.seeds.add()
+        entry.at, entry.diameter = seed.at, seed.diameter
+    settings.solver = shaping.solver.upper()
+    settings.shaping_tolerance = shaping.tolerance
+    settings.shaping_iterations = shaping.iterations
+
+
+def packing_text(recipe: Recipe) -> str:
+    """What the places of the bubbles depend on, as text: equal texts give equal places."""
+    return recipe_to_toml(Recipe(packing=recipe.packing, region=recipe.region))
+
+
+def recipe_text(recipe: Recipe) -> str:
+    """What the pattern's points depend on, as text; how the features are cut is left out."""
+    return recipe_to_toml(replace(recipe, feature=Feature()))
+
+
+def is_outdated(settings: Any) -> bool:
+    """Whether the settings say something else than the points that stand there."""
+    try:
+        return settings.made_with != recipe_text(recipe_of(settings))
+    except RecipeError:
+        return True
+
+
+def length_text(context: bpy.types.Context, value: float) -> str:
+    """A length in the scene's unit."""
+    units = context.scene.unit_settings
+    return (
+        bpy.utils.units.to_string(units.system, 'LENGTH', value * units.scale_length, precision=4)
+        if (units.system != 'NONE')
+        else f"{value:.4g}"
+    )
+
+
+def spoken(error: PatternError, context: bpy.types.Context) -> str:
+    """What `error` says, with the recipe's keys under their names in the sidebar and its lengths in the
+    scene's unit.
+    """
+    known = BubblePatternSettings.bl_rna.properties
+
+    def name_of(key: re.Match[str]) -> str:
+        """The sidebar's name of a key such as [packing] pitch; the key itself where the sidebar has none."""
+        return known[key[1]].name if key[1] in known else key[0]
+
+    return re.sub(r"\[\w+\] (\w+)", name_of, error.told(lambda value: length_text(context, value)))
