@@ -30,7 +30,7 @@ from .core.pipeline import pattern_steps
 from .core.progress import Progress, Steps, drive, within
 from .core.recipe import Recipe, default_recipe, load_recipe, recipe_to_toml
 from .core.region import Region, make_region
-from .core.selection import select
+from .core.selection import select, sub_regions
 from .core.sides import check_one_side
 from .core.solid import Part, part_steps
 from .core.soundness import sound_base
@@ -96,8 +96,10 @@ def run_steps(base: LoadedBase, recipe_file: Path) -> Steps[Run]:
     """
     clock = Clock()
     yield Progress("Reading the region", 0.0)
-    selected = select(base.mesh, load_recipe(recipe_file).region, base.attributes, base.materials)
-    region = make_region(base.mesh, selected)
+    choice = load_recipe(recipe_file).region
+    selected = select(base.mesh, choice, base.attributes, base.materials)
+    parts = sub_regions(choice, base.attributes, base.materials)
+    region = make_region(base.mesh, selected, parts, choice.gap)
     recipe = load_recipe(recipe_file, default_recipe(region.area, region.perimeter))
     sound_base(base.mesh)  # step 3 looks again; but nobody shall wait for a packing to be told of a hole
     if recipe.feature.depth is None:

@@ -238,7 +238,7 @@ def write_jpeg(path: Path, pixels: Floats, quality: int) -> None:
     height, width = pixels.shape[:2]
     image = bpy.data.images.new(path.stem, width, height)
     try:
-        image.pixels.foreach_set(pixels.astype(np.float32).ravel())
+        image.pixels.foreach_set(pixels.astype("f4").ravel())
         image.file_format = 'JPEG'
         image.save(filepath=str(path), quality=quality)
     finally:

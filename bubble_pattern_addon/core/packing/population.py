@@ -19,7 +19,8 @@ VOID = 0.8
 # Free bubbles nearer to the boundary than this many radii have been pressed through the first row.
 PRESSED_OUT = 2.2
 # A bubble whose overlap ratio is above this is too crowded; it is 6 in the hexagonal arrangement.
-CROWDED = 6.8
+# Where the pitch is graded, rows of fewer bubbles follow rows of more: whoever is left over goes earlier.
+CROWDED, CROWDED_GRADED = 6.8, 6.4
 # Only bubbles with less overlap than this can stand at a void.
 LONELY = 5.6
 
@@ -43,7 +44,8 @@ def control(ground: Ground, bubbles: Bubbles, pitch: Floats) -> tuple[Bubbles, i
     distance = np.linalg.norm(points[pairs.first] - points[pairs.second], axis=1)
     ratio = overlap_ratio(pairs, distance, pitch)
     gone = pressed_out(ground, bubbles, pitch)
-    gone[m:] |= _too_crowded(pairs, distance, ratio, m)
+    most = CROWDED if ground.uniform is not None else CROWDED_GRADED
+    gone[m:] |= _too_crowded(pairs, distance, ratio, m, most)
     added = _voids(ground, points, row, pitch, np.flatnonzero(ratio < LONELY))
     if not gone.any() and not len(added.row):
         return bubbles, 0
@@ -60,13 +62,13 @@ def pressed_out(ground: Ground, bubbles: Bubbles, pitch: Floats) -> Bools:
     return out
 
 
-def _too_crowded(pairs: Pairs, distance: Floats, ratio: Floats, m: int) -> Bools:
-    """Free bubbles that are crowded and no neighbour of theirs is more so, among n - m free ones."""
+def _too_crowded(pairs: Pairs, distance: Floats, ratio: Floats, m: int, most: float) -> Bools:
+    """Which of the n - m free bubbles have an overlap ratio above `most` while no neighbour has more."""
     closest = np.full(len(ratio), np.inf)
     relative = distance / pairs.stable
     np.minimum.at(closest, pairs.first, relative)
     np.minimum.at(closest, pairs.second, relative)
-    crowded = (ratio > CROWDED) | (closest < 0.6)
+    crowded = (ratio > most) | (closest < 0.6)
     crowded[:m] = False
     rivals = crowded[pairs.first] & crowded[pairs.second]
     order = np.lexsort((np.arange(len(ratio)), -ratio)).argsort()
