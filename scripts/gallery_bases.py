@@ -194,7 +194,7 @@ def desk_phone() -> GalleryBase:
         return rise * flat[:, 1] - flat[:, 1] ** 2 / 2600 + 1.2 * smooth((beyond(flat, grille) - 0.3) / 5)
 
     def detail(flat: Floats) -> Floats:
-        sunk = -0.9 * smooth(-beyond(flat, display) / 2.0)
+        sunk = -0.5 * smooth(-beyond(flat, display) / 2.0)
         return sunk + np.sum([_button(flat, key, 1.8) for key in keys], axis=0)
 
     contours = [
