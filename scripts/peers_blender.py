@@ -57,7 +57,7 @@ def read(base_object: Any) -> Base:
 
 
 def ours(base_object: Any, pattern: Pattern, feature: Feature) -> tuple[float, int]:
-    """Seconds from the object, not seen before, to the part's mesh as the add-on makes it; the part's faces."""
+    """Seconds from the object, not seen before, to the part's mesh as the add-on makes it; its faces."""
     forget_base()
     start = time.perf_counter()
     with evaluated_mesh(base_object, bpy.context.evaluated_depsgraph_get()) as mesh:
