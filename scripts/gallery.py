@@ -210,7 +210,6 @@ def read_picture(path: Path, size: tuple[int, int]) -> Floats:
 def write_jpeg(path: Path, pixels: Floats, quality: int) -> None:
     """Write pixels (height, width, 4), the lowest row first."""
     import bpy
-    import numpy as np
 
     height, width = pixels.shape[:2]
     image = bpy.data.images.new(path.stem, width, height)
