@@ -186,7 +186,7 @@ class BubblePatternSettings(bpy.types.PropertyGroup):
         description="How the size of the features is given",
         items=(
             ('SIZE', "Size", "As a diameter"),
-            ('SHARE', "Share of Pitch", "Relative to the pitch there: large features where it is wide"),
+            ('SHARE', "Share", "Relative to the pitch there: large features where it is wide"),
         ),
         default='SIZE',
         update=reshape,
