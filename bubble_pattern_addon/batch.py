@@ -8,30 +8,34 @@ command. What only Blender can do (a .blend as base, a .blend or a picture as ou
 from __future__ import annotations
 
 import argparse
+import shutil
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
-from typing import IO, Any, NoReturn, Protocol, cast
+from typing import Any, NoReturn, Protocol, cast
 
 import numpy as np
 
-from .core.errors import BaseError, OutputError, PatternError, RecipeError, RegionError
+from .core.errors import BaseError, FieldError, OutputError, PatternError
 from .core.export import make_report, write_features, write_report
+from .core.field_tables import Wanted, wanted, with_images
 from .core.files import LoadedBase, load_base, output_folder, write_mesh
-from .core.mesh import Bools
-from .core.metric import Constant
+from .core.mesh import Bools, Floats
 from .core.pattern import Pattern
 from .core.pipeline import pattern_steps
 from .core.progress import Progress, Steps, drive, within
-from .core.quality import min_margin, min_web
 from .core.recipe import Recipe, default_recipe, load_recipe, recipe_to_toml
 from .core.region import Region, make_region
-from .core.selection import select
+from .core.selection import select, sub_regions
+from .core.sides import check_one_side
 from .core.solid import Part, part_steps
 from .core.soundness import sound_base
+from .core.surroundings import Surroundings
+from .terminal import line_on, silenced
 
 EXAMPLE = """\
 example of a recipe:
@@ -50,7 +54,10 @@ example of a run:
 
 @dataclass(frozen=True)
 class Run:
-    """Everything a batch run knows when the part is made; selected: (T,) the target region's triangles."""
+    """Everything a batch run knows when the part is made.
+
+    selected: (T,) the target region's triangles; origin: the folder from which the recipe names its images
+    """
 
     recipe: Recipe
     base: LoadedBase
@@ -59,13 +66,20 @@ class Run:
     pattern: Pattern
     part: Part
     report: Mapping[str, Any]
+    origin: Path = Path()
 
 
 class BlenderSide(Protocol):
     """What `blender.batch_base` does for a batch run."""
 
-    def read_base(self, path: Path | None) -> LoadedBase:
-        """The base in a .blend file, in world coordinates; None: in the file that is open."""
+    def read_base(self, path: Path | None, names: Wanted) -> LoadedBase:
+        """The base in a .blend file, in world coordinates, with what `names` asks for; None: in the file that
+        is open.
+        """
+        ...
+
+    def read_image(self, name: str, folder: Path) -> Floats:
+        """The pixels of an image file, or of the open file's image of that name."""
         ...
 
     def write_blend(self, path: Path, run: Run) -> None:
@@ -87,21 +101,53 @@ def run_steps(base: LoadedBase, recipe_file: Path) -> Steps[Run]:
     """
     clock = Clock()
     yield Progress("Reading the region", 0.0)
-    selected = select(base.mesh, load_recipe(recipe_file).region, base.attributes, base.materials)
-    region = make_region(base.mesh, selected)
-    segments = region.boundary_segments
-    perimeter = float(np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1).sum())
-    recipe = load_recipe(recipe_file, default_recipe(region.area, perimeter))
+    choice = load_recipe(recipe_file).region
+    selected = select(base.mesh, choice, base.attributes, base.materials)
+    parts = sub_regions(choice, base.attributes, base.materials)
+    region = make_region(base.mesh, selected, parts, choice.gap)
+    recipe = load_recipe(recipe_file, default_recipe(region.area, region.perimeter))
     sound_base(base.mesh)  # step 3 looks again; but nobody shall wait for a packing to be told of a hole
+    if recipe.feature.depth is None:
+        check_one_side(base.mesh, selected)
+    surroundings = surroundings_of(base, read_images(recipe, recipe_file.parent))
     clock.stop("region")
-    pattern = yield from clock.timed(within(pattern_steps(region, recipe), 0.0, 0.5))
-    check_limits(recipe, region, pattern)
+    pattern = yield from clock.timed(within(pattern_steps(region, recipe, surroundings), 0.0, 0.5))
     part = yield from within(part_steps(base.mesh, pattern, recipe.feature), 0.5, 1.0)
     clock.stop("add")
     report = make_report(region, pattern, part, clock.seconds)
     if part.check.problems:
         raise BaseError(f"The part is not good: {' '.join(part.check.problems)}")
-    return Run(recipe, base, selected, region, pattern, part, report)
+    return Run(recipe, base, selected, region, pattern, part, report, recipe_file.parent)
+
+
+def read_images(recipe: Recipe, folder: Path) -> dict[str, Floats]:
+    """The images that the recipe's fields ask for, by name, seen from `folder`.
+
+    Raises FieldError where one cannot be read, or this Python has no Blender in it.
+    """
+    names = sorted(wanted(recipe.packing.pitch, recipe.shaping.diameter).images)
+    if not names:
+        return {}
+    try:
+        side = blender_side()
+    except OutputError as error:
+        raise FieldError(
+            f'Image "{names[0]}" needs Blender to be read ({error.__cause__}): run this in Blender, with '
+            "`blender -b -P scripts/pattern_batch.py -- ...`"
+        ) from None
+    return {name: side.read_image(name, folder) for name in names}
+
+
+def surroundings_of(base: LoadedBase, images: Mapping[str, Floats]) -> Surroundings:
+    """What the recipe's fields may ask for beside the region."""
+    masks = {name: mask.astype(np.float64) for name, mask in base.attributes.items()}
+    return Surroundings(
+        attributes=masks | dict(base.values),
+        materials=base.materials,
+        uv_maps=base.uv_maps,
+        images=images,
+        objects=base.objects,
+    )
 
 
 class Clock:
@@ -132,28 +178,6 @@ class Clock:
             yield progress
 
 
-def check_limits(recipe: Recipe, region: Region, pattern: Pattern) -> None:
-    """RegionError where no feature fits, RecipeError where less material remains than the limits ask for."""
-    if not len(pattern):
-        raise RegionError(
-            "No feature fits into the target region: make the pitch smaller or the region larger"
-        )
-    web, margin, limits = min_web(pattern), min_margin(pattern, region), recipe.limits
-    diameter = recipe.shaping.diameter
-    most = (
-        f"make the diameter at most {diameter.value - (limits.min_web - web):.4g}"
-        if isinstance(diameter, Constant)
-        else "make the diameters smaller"
-    )
-    if web < limits.min_web:
-        raise RecipeError(f"The smallest web is {web:.4g}, below min_web = {limits.min_web:g}: {most}")
-    if margin < limits.min_margin:
-        raise RecipeError(
-            f"The smallest margin is {margin:.4g}, below min_margin = {limits.min_margin:g}: "
-            f"raise edge_offset by {limits.min_margin - margin:.4g}"
-        )
-
-
 def write_run(run: Run, folder: Path, blender: Callable[[], BlenderSide]) -> None:
     """All files of a run, into a folder that is there (see files.output_folder)."""
     write_mesh(folder / "part.stl", run.part.mesh)
@@ -161,11 +185,27 @@ def write_run(run: Run, folder: Path, blender: Callable[[], BlenderSide]) -> Non
         write_mesh(folder / f"part.{name}", run.part.mesh)
     write_features(folder / "features.csv", run.pattern)
     write_report(folder / "report.json", run.report)
-    (folder / "recipe.toml").write_text(recipe_to_toml(run.recipe), encoding="utf-8")
+    recipe = with_copied_images(run, folder)
+    (folder / "recipe.toml").write_text(recipe_to_toml(recipe), encoding="utf-8")
     if run.recipe.output.blend:
         blender().write_blend(folder / "pattern.blend", run)
     if run.recipe.output.picture:
         blender().write_picture(folder / "part.png", run)
+
+
+def with_copied_images(run: Run, folder: Path) -> Recipe:
+    """The recipe with the image files that it names copied beside it: there it makes the same part."""
+    packing, shaping = run.recipe.packing, run.recipe.shaping
+    names: dict[str, str] = {}
+    for number, name in enumerate(sorted(wanted(packing.pitch, shaping.diameter).images), 1):
+        if (run.origin / name).is_file():  # else it is in the .blend
+            names[name] = f"image_{number}{Path(name).suffix}"
+            shutil.copyfile(run.origin / name, folder / names[name])
+    return replace(
+        run.recipe,
+        packing=replace(packing, pitch=with_images(packing.pitch, names)),
+        shaping=replace(shaping, diameter=with_images(shaping.diameter, names)),
+    )
 
 
 def blender_side() -> BlenderSide:
@@ -176,7 +216,7 @@ def blender_side() -> BlenderSide:
         raise OutputError(
             f"A .blend file or a picture needs Blender ({error}): run this in Blender, with "
             "`blender -b -P scripts/pattern_batch.py -- ...`"
-        ) from None
+        ) from error
     # by name, because the two rooms know each other's types and a checker loses its way in the circle
     return cast(BlenderSide, import_module(".blender.batch_base", __package__))
 
@@ -210,16 +250,16 @@ def parse(arguments: Sequence[str], prog: str) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def read_base(path: Path | None, in_blender: bool) -> LoadedBase:
-    """The base that the command line names; None is the file open in Blender."""
+def read_base(path: Path | None, in_blender: bool, names: Wanted) -> LoadedBase:
+    """The base that the command line names, with what `names` asks for; None is the file open in Blender."""
     if path is None:
         if not in_blender:
             raise BaseError("No base is given: add --base MODEL")
-        return blender_side().read_base(None)
+        return blender_side().read_base(None, names)
     if path.suffix.lower() == ".blend":
         if not path.exists():
             raise BaseError(f"Base {path} does not exist: check the path")
-        return blender_side().read_base(path)
+        return blender_side().read_base(path, names)
     return load_base(path)
 
 
@@ -238,12 +278,16 @@ def main(
     except SystemExit as end:  # --help or a wrong command line: said already
         return int(end.code or 0)
     show = None if options.quiet else report or line_on(sys.stderr)
+    hushed = silenced if options.quiet else nullcontext  # Blender tells of every file it reads and saves
     try:
-        load_recipe(options.recipe)  # nonsense is told before a long read
-        base = read_base(options.base, in_blender)
+        recipe = load_recipe(options.recipe)  # nonsense is told before a long read
+        with hushed():
+            names = wanted(recipe.packing.pitch, recipe.shaping.diameter)
+            base = read_base(options.base, in_blender, names)
         with output_folder(options.out) as folder:
             run = drive(run_steps(base, options.recipe), show)
-            write_run(run, folder, blender_side)
+            with hushed():
+                write_run(run, folder, blender_side)
     except PatternError as error:
         return _failed(prog, str(error), show)
     except MemoryError:
@@ -267,24 +311,9 @@ def summary(run: Run, out: Path) -> str:
     """One line on what was made."""
     figures = run.report
     webs = "" if figures["min_web"] is None else f", smallest web {figures['min_web']:.3g}"
+    limits = figures["limits"]
+    cut = "".join(f", {limits[key]:,} {key}" for key in ("shrunk", "dropped") if limits[key])
     return (
-        f"{figures['features']:,} holes, {100 * figures['open_area']:.1f} % open{webs}; "
+        f"{figures['features']:,} holes, {100 * figures['open_area']:.1f} % open{webs}{cut}; "
         f"watertight part in {out / 'part.stl'}"
     )
-
-
-def line_on(stream: IO[str]) -> Callable[[Progress], None]:
-    """A reporter that keeps one line of `stream` up to date; where that is no terminal, a line per stage."""
-    said = ""
-    terminal = stream.isatty()
-
-    def show(progress: Progress) -> None:
-        nonlocal said
-        if terminal:
-            text = "" if progress.stage == "Done" else f"{progress.stage} {100 * progress.fraction:.0f} %"
-            print(f"\r{text:<60}", end="\r" if not text else "", file=stream, flush=True)
-        elif progress.stage not in (said, "Done"):
-            print(f"{progress.stage} ...", file=stream, flush=True)
-        said = progress.stage
-
-    return show

@@ -16,6 +16,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -26,16 +27,19 @@ from scipy.spatial import cKDTree
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
+from bubble_pattern_addon.core.blending import Fill
+from bubble_pattern_addon.core.distance import boundary_distance
+from bubble_pattern_addon.core.fields import Linear, Radial
 from bubble_pattern_addon.core.mesh import Floats, Mesh
 from bubble_pattern_addon.core.metric import Constant
 from bubble_pattern_addon.core.pattern import Pattern
 from bubble_pattern_addon.core.pipeline import pattern_steps
 from bubble_pattern_addon.core.progress import drive
-from bubble_pattern_addon.core.quality import Quality, boundary_distance, measure, measure_points
+from bubble_pattern_addon.core.quality import Quality, measure, measure_points
 from bubble_pattern_addon.core.recipe import Feature, Packing, Recipe, Shaping
 from bubble_pattern_addon.core.region import Region, make_region
 from bubble_pattern_addon.core.solid import Part, part_steps, plan_steps
-from bubble_pattern_addon.core.soundness import forget
+from bubble_pattern_addon.core.soundness import forget_base
 from scripts import peers
 from scripts.shapes import SHAPES, Shape, circle, curved_slab, plate, rectangle_outline, trapezoid_outline
 
@@ -206,9 +210,8 @@ def flat(repeats: int) -> None:
             grid = peers.clipped_grid(outlines[name], shape.pitch)
             region = make_region(shape.mesh, shape.selected)
             print_rows([peer_row(name, "clipped hexagonal grid", grid, region, grid.seconds)])
-    print(
-        f"\nPeak memory of a process that packs the trapezoid finely: {peak_memory('--pack-once', 'trapezoid', '0.295')}"
-    )
+    peak = peak_memory("--pack-once", "trapezoid", "0.295")
+    print(f"\nPeak memory of a process that packs the trapezoid finely: {peak}")
 
 
 def curved(repeats: int) -> None:
@@ -231,17 +234,52 @@ def curved(repeats: int) -> None:
         against(name, shape, shape.pitch, "", None, repeats)
 
 
+GRADED = (
+    ("trapezoid", "linear 2 to 6", Linear(from_=2.0, to=6.0, direction=(1.0, 0.0, 0.0))),
+    ("trapezoid", "radial 1 to 4", Radial(from_=1.0, to=4.0, centre=(-20.0, -10.0, 0.0))),
+    ("panel", "linear 4 to 12", Linear(from_=4.0, to=12.0, direction=(1.0, 0.0, 0.0))),
+    ("panel", "radial 2.5 to 10", Radial(from_=2.5, to=10.0, centre=(-30.0, -20.0, 20.0))),
+)
+
+
+def graded(repeats: int) -> None:
+    """Graded packings, beside uniform ones at the same count on the same region."""
+    print("\n## Packing, graded\n\nFigures are relative to the local pitch; ratio: to uniform at that count.")
+    print_head("| region | pitch | n | seconds | ratio | six | ψ6 | gap CV | gap min | gap mean | rim CV |")
+    for name, words, field in GRADED:
+        shape = SHAPES[name]()
+        region = make_region(shape.mesh, shape.selected)
+        recipe = Recipe(packing=Packing(pitch=field), shaping=Shaping(diameter=Fill(Constant(0.6))))
+        pattern = drive(pattern_steps(region, recipe))
+        even = uniform(float(np.sqrt(region.area / (np.sqrt(0.75) * len(pattern)))))
+        ours, plain = in_turn([partial(packed_in, region, recipe), partial(packed_in, region, even)], repeats)
+        gap = cKDTree(pattern.position).query(pattern.position, 2)[0][:, 1] / pattern.pitch
+        q = measure(pattern, region)
+        print(
+            f"| {name} | {words} | {len(pattern):,} | {ours:.3f} | **{ours / plain:.2f}** | {q.six:.3f} "
+            f"| {q.psi6:.3f} | {q.gap_cv:.3f} | {q.gap_min:.3f} | {gap.mean():.3f} | {q.rim_cv:.4f} |",
+            flush=True,
+        )
+
+
+def packed_in(region: Region, recipe: Recipe) -> float:
+    """Seconds of packing and shaping `recipe` in `region`."""
+    start = time.perf_counter()
+    drive(pattern_steps(region, recipe))
+    return time.perf_counter() - start
+
+
 def adding(repeats: int) -> None:
     """`part_steps` with everything it does against the bare subtraction of the same cutters."""
     print(
-        "\n## Adding\n\n32-sided through-holes. Ours: everything, the base looked through for the first time; "
-        "again: the same base once more, known to be sound.\nBare: the subtraction alone, both solids built "
-        "beforehand; built: with their building. Seconds are the least of several runs in turn; the ratios "
-        "are ours by bare, again by bare,\nours by built, and ours by bare in seconds of all cores together."
+        "\n## Adding\n\n32-sided through-holes. Ours: everything, the base looked through for the first "
+        "time; again: the same\nbase once more, known to be sound. Bare: the subtraction alone, both solids built "
+        "beforehand; built: with their\nbuilding. Seconds are the least of several runs in turn; ratio: ours "
+        "by bare; cores: the same in seconds of all\ncores together."
     )
     print_head(
-        "| base | triangles | holes | ours, s | again, s | bare, s | built, s | ratio | again | by built | cores "
-        "| peak memory, ours | bare | watertight | genus | problems |"
+        "| base | triangles | holes | ours, s | again, s | bare, s | built, s | ratio | cores "
+        "| again by bare | ours by built | peak, ours | peak, built | watertight | genus | problems |"
     )
     for name, shape, pitch in adding_cases():
         add(name, shape, pitch, repeats)
@@ -272,7 +310,7 @@ def add(name: str, shape: Shape, pitch: float, repeats: int) -> None:
         parts[:] = [drive(part_steps(shape.mesh, pattern, HOLE))]
 
     def first() -> Taken:
-        forget()
+        forget_base()
         return timed(again)
 
     def bare() -> Taken:
@@ -287,9 +325,9 @@ def add(name: str, shape: Shape, pitch: float, repeats: int) -> None:
     seconds = (one.clock for one in (ours, known, alone, whole))
     ratios = (
         ours.clock / alone.clock,
+        ours.cores / alone.cores,
         known.clock / alone.clock,
         ours.clock / whole.clock,
-        ours.cores / alone.cores,
     )
     figures = [*(f"{value:.2f}" for value in seconds), *(f"**{value:.2f}**" for value in ratios)]
     peaks = [peak_memory("--add-once", name, str(pitch), way) for way in ("ours", "bare")]
@@ -308,8 +346,9 @@ def blender(repeats: int) -> None:
     from scripts import peers_blender as inside
 
     print(
-        f"\n## Adding in Blender {inside.version()}\n\nFrom the object to the new mesh, same cutters; ours with "
-        "the base looked through for the first time. Seconds are the least of several runs in turn."
+        f"\n## Adding in Blender {inside.version()}\n\nFrom the object to the new mesh, same cutters; ours "
+        "with the base looked through for the first time.\nSeconds are the least of several runs in turn; "
+        "cores: the ratio in seconds of all cores together."
     )
     print_head("| base | holes | ours, s | modifier, s | ratio | cores | faces, ours | faces, modifier |")
     for name, shape, pitch in adding_cases():
@@ -322,7 +361,7 @@ def blender(repeats: int) -> None:
         faces = [0, 0]
 
         def ours(given: tuple[Any, ...] = (base_object, pattern, HOLE), faces: list[int] = faces) -> Taken:
-            forget()
+            forget_base()
             return timed(lambda: faces.__setitem__(0, inside.ours(*given)))
 
         def theirs(given: tuple[Any, ...] = (base_object, cutter_object), faces: list[int] = faces) -> Taken:
@@ -389,6 +428,7 @@ def installed(module: str) -> bool:
 SECTIONS: dict[str, Callable[[int], None]] = {
     "flat": flat,
     "curved": curved,
+    "graded": graded,
     "adding": adding,
     "blender": blender,
 }

@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +15,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
+from bubble_pattern_addon.core.distance import boundary_distance
 from bubble_pattern_addon.core.mesh import Floats, Ints
-from bubble_pattern_addon.core.metric import Constant
-from bubble_pattern_addon.core.progress import drive
-from bubble_pattern_addon.core.quality import Quality, boundary_distance, measure_points, neighbours
-from bubble_pattern_addon.core.recipe import Packing, Recipe, Shaping
-from bubble_pattern_addon.core.region import make_region
+from bubble_pattern_addon.core.quality import Quality, measure_points, neighbours
+from scripts.benchmark import pack
 from scripts.shapes import SHAPES
 
 matplotlib.use("Agg")
@@ -153,8 +149,6 @@ def _words(n: int, quality: Quality) -> str:
 
 def main() -> None:
     """Run the pipeline on one of the shapes and draw its pattern."""
-    from bubble_pattern_addon.core.pipeline import pattern_steps
-
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -172,13 +166,7 @@ def main() -> None:
     chosen = parser.parse_args()
     shape = SHAPES[chosen.shape]()
     pitch = chosen.pitch or shape.pitch
-    recipe = replace(
-        Recipe(), packing=Packing(pitch=Constant(pitch)), shaping=Shaping(diameter=Constant(0.6 * pitch))
-    )
-    start = time.perf_counter()
-    region = make_region(shape.mesh, shape.selected)
-    pattern = drive(pattern_steps(region, recipe))
-    seconds = time.perf_counter() - start
+    pattern, region, seconds = pack(shape, pitch)
     quality = draw(
         pattern.position,
         chosen.output,

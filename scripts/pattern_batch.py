@@ -11,7 +11,6 @@ environment beside this folder, made with Blender's own Python on first use.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -20,6 +19,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from scripts import environment  # noqa: E402
+from scripts.progress_bar import progress_bar  # noqa: E402
 
 LIBRARIES = ("numpy", "scipy", "trimesh", "manifold3d")
 
@@ -49,7 +49,9 @@ def find_libraries(arguments: list[str]) -> None:
 
 
 def _asks_for_blender(arguments: list[str]) -> bool:
-    """Whether the base is a .blend or the recipe wants one or a picture; a broken recipe is told of later."""
+    """Whether the base is a .blend, or the recipe wants one or a picture, or has an image to be read; a
+    broken recipe is told of later.
+    """
     import tomllib
 
     if any(argument.lower().endswith(".blend") for argument in arguments):
@@ -57,30 +59,19 @@ def _asks_for_blender(arguments: list[str]) -> bool:
     for argument in arguments:
         if argument.lower().endswith(".toml"):
             try:
-                output = tomllib.loads(Path(argument).read_text("utf-8")).get("output", {})
-                return bool(output.get("blend") or output.get("picture"))
+                tables = tomllib.loads(Path(argument).read_text("utf-8"))
+                output = tables.get("output", {})
+                return bool(output.get("blend") or output.get("picture")) or _has_image(tables)
             except (OSError, ValueError, AttributeError):
                 return False
     return False
 
 
-def bar() -> Callable[[Any], None] | None:
-    """A tqdm bar that follows the progress; None where tqdm is not there."""
-    if find_spec("tqdm") is None or not sys.stderr.isatty():
-        return None
-    from tqdm import tqdm
-
-    shown = tqdm(total=100, leave=False, bar_format="{desc:<24}{percentage:3.0f}% |{bar}| {elapsed}")
-
-    def show(progress: Any) -> None:
-        if progress.stage == "Done":
-            shown.close()
-            return
-        shown.set_description_str(progress.stage, refresh=False)
-        shown.n = round(100 * progress.fraction)
-        shown.refresh()
-
-    return show
+def _has_image(value: object) -> bool:
+    """Whether there is a field of the kind image somewhere in these tables."""
+    if isinstance(value, dict):
+        return value.get("kind") == "image" or any(map(_has_image, value.values()))
+    return isinstance(value, list) and any(map(_has_image, value))
 
 
 def main() -> int:
@@ -94,7 +85,7 @@ def main() -> int:
     from bubble_pattern_addon import batch
 
     quiet = "--quiet" in arguments
-    return batch.main(arguments, "pattern_batch.py", None if quiet else bar(), in_blender())
+    return batch.main(arguments, "pattern_batch.py", None if quiet else progress_bar(), in_blender())
 
 
 if __name__ == "__main__":

@@ -5,22 +5,17 @@ gmsh and Instant Meshes are installed by the extra `benchmark`; what is not inst
 
 from __future__ import annotations
 
-import os
-import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
+from bubble_pattern_addon.core.distance import boundary_distance
 from bubble_pattern_addon.core.mesh import Floats, Mesh
-from bubble_pattern_addon.core.quality import boundary_distance
+from bubble_pattern_addon.terminal import silenced
 from scripts.shapes import ISLAND, TRAPEZOID, TRAPEZOID_RADIUS, inside_outline, outline_segments
 
 NEAR_ENOUGH = 0.02
@@ -110,7 +105,7 @@ def instant_meshes(mesh: Mesh, spacing: float, follow_boundary: bool = True) -> 
 
     vertices = mesh.vertices.astype(np.float32)
     faces = mesh.triangles.astype(np.uint32)
-    with _silence():
+    with silenced():
         start = time.perf_counter()
         found, triangles = remesh(
             vertices,
@@ -131,21 +126,6 @@ def instant_meshes(mesh: Mesh, spacing: float, follow_boundary: bool = True) -> 
     length = np.linalg.norm(normal, axis=1)
     used = length > 0
     return Arrangement(position[used], normal[used] / length[used, None], spacing, seconds)
-
-
-@contextmanager
-def _silence() -> Iterator[None]:
-    """Send what a library writes straight to the standard output to nowhere."""
-    sys.stdout.flush()
-    kept = os.dup(1)
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nowhere, 1)
-        yield
-    finally:
-        os.dup2(kept, 1)
-        os.close(kept)
-        os.close(nowhere)
 
 
 def clipped_grid(outline: list[Floats], pitch: float) -> Arrangement:

@@ -6,17 +6,13 @@ Needs the Blender module (`bpy`).
 from __future__ import annotations
 
 import os
-import sys
 import tempfile
-from pathlib import Path
 from typing import Any
 
 os.environ.setdefault("BLENDER_USER_EXTENSIONS", tempfile.mkdtemp(prefix="bubble_pattern_"))
 
 import bpy
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from bubble_pattern_addon.blender.part_mesh import build_part_mesh
 from bubble_pattern_addon.blender.provenance import read_original

@@ -116,11 +116,16 @@ def fine_sheet(outline: list[Floats], spacing: float) -> Mesh:
     points = np.concatenate([rim, inner])
     triangles = Delaunay(points).simplices.astype(np.int64)
     triangles = triangles[inside_outline(points[triangles].mean(axis=1), outline)]
-    a, b, c = points[triangles].swapaxes(0, 1)
-    turn = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    turn = doubled_areas(points, triangles)
     triangles[turn < 0] = triangles[turn < 0][:, ::-1]
     triangles = triangles[np.abs(turn) > 1e-9 * spacing**2]
     return Mesh(np.column_stack([points, np.zeros(len(points))]), triangles)
+
+
+def doubled_areas(points: Floats, triangles: Ints) -> Floats:
+    """Twice the area of triangles (T, 3) on points (n, 2), (T,): below 0 where they run clockwise."""
+    a, b, c = points[triangles].swapaxes(0, 1)
+    return (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
 
 
 def _resampled(loop: Floats, spacing: float) -> Floats:

@@ -9,12 +9,13 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty
+from bpy.props import BoolProperty, FloatProperty
 
 from ..core.progress import Progress, Steps
+from .field_properties import length_property, typed
 from .properties import in_scene, is_pattern, pattern_objects, pattern_of, recipe_of
 from .stepping import SteppedOperator
-from .target_region import free_name, selected_faces, store, stored, wanted_faces
+from .target_region import free_name, selected_faces, store, stored, trying_region, wanted_faces
 
 
 def refused(cls: Any, reason: str) -> bool:
@@ -48,12 +49,46 @@ def poll_object_mode(cls: Any, context: bpy.types.Context) -> bool:
     return context.mode == 'OBJECT' or refused(cls, "Switch to Object Mode first")
 
 
-class BUBBLE_PATTERN_OT_add(SteppedOperator, bpy.types.Operator):
+SIZE_OR_NONE = {"min": 0.0, "soft_max": 10.0, "options": {'SKIP_SAVE'}}
+
+
+class OnPattern:
+    """Mixin for an operator on a pattern, in Object Mode."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return poll_pattern(cls, context) and poll_object_mode(cls, context)
+
+
+class LayingOperator(SteppedOperator):
+    """Mixin for an operator that lays a pattern: its steps end with the pattern's object."""
+
+    def done(self, context: bpy.types.Context, result: bpy.types.Object) -> None:
+        """Say how many features there are."""
+        count = result.bubble_pattern.count
+        if count == 0:
+            self.report({'WARNING'}, "No feature fits in the region: make the pitch smaller")
+        else:
+            self.report({'INFO'}, f"{count:,} feature{'s' if count > 1 else ''}")
+
+
+class BUBBLE_PATTERN_OT_add(LayingOperator, bpy.types.Operator):
     """Fill the selected faces with a tight pattern of holes; in Object Mode all faces or those marked"""
 
     bl_idname = "bubble_pattern.add"
     bl_label = "Add Pattern"
     bl_options = {'REGISTER', 'UNDO'}
+
+    # SKIP_SAVE: the next region has a size of its own.
+    pitch: length_property(
+        "Pitch",
+        "Distance between the centers of neighboring features, or 0 to choose it by the region's size",
+        **SIZE_OR_NONE,
+    )
+    diameter: length_property(
+        "Diameter", "Diameter of the features, or 0 to let it follow the pitch", **SIZE_OR_NONE
+    )
+    chosen_diameter: FloatProperty(options={'HIDDEN', 'SKIP_SAVE'})
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -83,52 +118,45 @@ class BUBBLE_PATTERN_OT_add(SteppedOperator, bpy.types.Operator):
         yield Progress("Reading the base", 0.0)
         base = context.active_object
         editing = base.mode == 'EDIT'
-        if editing:
-            bpy.ops.object.mode_set(mode='OBJECT')
         name = free_name(base)
-        before = stored(base, name)
-        obj = None
-        try:
+        with trying_region(base, name):
             store(base, name, wanted_faces(base, name, editing))
             source = generation.read_source(base, name, context)
-            recipe = generation.fitting_recipe(source.region)
+            recipe = generation.fitting_recipe(source.region, name, *self.wanted_lengths())
             laid = yield from generation.laying_steps(source, recipe)
             obj = new_pattern_object(base)
-            generation.fill_settings(obj, base, name, recipe)
-            generation.put(obj, source, recipe_of(obj.bubble_pattern), laid)
-        except BaseException:  # a cancelled run too leaves everything as it was
-            if obj is not None:
+            try:
+                generation.fill_settings(obj, base, name, recipe)
+                generation.put(obj, source, recipe_of(obj.bubble_pattern), laid)
+            except BaseException:
                 remove_object(obj)
-            store(base, name, before)
-            if editing:
-                bpy.ops.object.mode_set(mode='EDIT')
-            raise
+                raise
         generation.show_part(obj, context, False)
         return obj
 
+    def wanted_lengths(self) -> tuple[float | None, float | None]:
+        """Pitch and diameter as the user wants them; None for what is left to us.
+
+        A diameter that we chose and the user left alone follows another pitch.
+        """
+        own = self.diameter not in (0.0, self.chosen_diameter)
+        return typed(self.pitch) or None, typed(self.diameter) if own else None
+
     def done(self, context: bpy.types.Context, result: bpy.types.Object) -> None:
-        report_pattern(self, result)
+        """Show what was chosen in Adjust Last Operation, to start from."""
+        super().done(context, result)
+        settings = result.bubble_pattern
+        if self.wanted_lengths()[1] is None:
+            self.diameter = self.chosen_diameter = settings.diameter
+        self.pitch = settings.pitch
 
 
-def report_pattern(operator: bpy.types.Operator, obj: bpy.types.Object) -> None:
-    """Say how many features there are."""
-    count = obj.bubble_pattern.count
-    if count == 0:
-        operator.report({'WARNING'}, "No feature fits in the region: make the pitch smaller")
-    else:
-        operator.report({'INFO'}, f"{count:,} feature{'s' if count > 1 else ''}")
-
-
-class BUBBLE_PATTERN_OT_update(SteppedOperator, bpy.types.Operator):
+class BUBBLE_PATTERN_OT_update(OnPattern, LayingOperator, bpy.types.Operator):
     """Lay the pattern anew by its settings, on the base as it is now"""
 
     bl_idname = "bubble_pattern.update"
     bl_label = "Update"
     bl_options = {'REGISTER', 'UNDO'}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return poll_pattern(cls, context) and poll_object_mode(cls, context)
 
     def steps(self, context: bpy.types.Context) -> Steps[bpy.types.Object]:
         from . import generation
@@ -137,26 +165,19 @@ class BUBBLE_PATTERN_OT_update(SteppedOperator, bpy.types.Operator):
         yield from generation.update_steps(obj, context)
         return obj
 
-    def done(self, context: bpy.types.Context, result: bpy.types.Object) -> None:
-        report_pattern(self, result)
 
-
-class BUBBLE_PATTERN_OT_apply(SteppedOperator, bpy.types.Operator):
+class BUBBLE_PATTERN_OT_apply(OnPattern, SteppedOperator, bpy.types.Operator):
     """Make the finished part, a solid with the holes, in place of the base, which is kept, hidden"""
 
     bl_idname = "bubble_pattern.apply"
     bl_label = "Apply"
     bl_options = {'REGISTER', 'UNDO'}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return poll_pattern(cls, context) and poll_object_mode(cls, context)
-
     def steps(self, context: bpy.types.Context) -> Steps[Any]:
-        from . import generation
+        from . import applying
 
         yield Progress("Reading the base", 0.0)
-        result = yield from generation.apply_steps(current_pattern(context), context)
+        result = yield from applying.apply_steps(current_pattern(context), context)
         return result
 
     def done(self, context: bpy.types.Context, result: Any) -> None:
@@ -171,16 +192,12 @@ class BUBBLE_PATTERN_OT_apply(SteppedOperator, bpy.types.Operator):
             self.report({'INFO'}, f"Watertight part with {holes}")
 
 
-class BUBBLE_PATTERN_OT_edit(bpy.types.Operator):
+class BUBBLE_PATTERN_OT_edit(OnPattern, bpy.types.Operator):
     """Show the base with its pattern again, and hide the part"""
 
     bl_idname = "bubble_pattern.edit"
     bl_label = "Edit Pattern"
     bl_options = {'REGISTER', 'UNDO'}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return poll_pattern(cls, context) and poll_object_mode(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         from . import generation
@@ -235,7 +252,7 @@ def remove_object(obj: bpy.types.Object) -> None:
         bpy.data.meshes.remove(mesh)
 
 
-class BUBBLE_PATTERN_OT_region_assign(SteppedOperator, bpy.types.Operator):
+class BUBBLE_PATTERN_OT_region_assign(LayingOperator, bpy.types.Operator):
     """Let the selected faces be the target region of the pattern"""
 
     bl_idname = "bubble_pattern.region_assign"
@@ -253,20 +270,11 @@ class BUBBLE_PATTERN_OT_region_assign(SteppedOperator, bpy.types.Operator):
         base = context.active_object
         obj = current_pattern(context)
         name = obj.bubble_pattern.region
-        bpy.ops.object.mode_set(mode='OBJECT')
-        before = stored(base, name)
-        try:
+        with trying_region(base, name):
             store(base, name, selected_faces(base))
             yield from generation.update_steps(obj, context)
-        except BaseException:
-            store(base, name, before)
-            bpy.ops.object.mode_set(mode='EDIT')
-            raise
         generation.show_part(obj, context, False)
         return obj
-
-    def done(self, context: bpy.types.Context, result: bpy.types.Object) -> None:
-        report_pattern(self, result)
 
 
 def poll_edit_base(cls: Any, context: bpy.types.Context, need_faces: bool) -> bool:
@@ -278,16 +286,12 @@ def poll_edit_base(cls: Any, context: bpy.types.Context, need_faces: bool) -> bo
     return True
 
 
-class BUBBLE_PATTERN_OT_region_edit(bpy.types.Operator):
+class BUBBLE_PATTERN_OT_region_edit(OnPattern, bpy.types.Operator):
     """Go to Edit Mode of the base with the faces of the target region selected"""
 
     bl_idname = "bubble_pattern.region_edit"
     bl_label = "Edit Region"
     bl_options = {'REGISTER', 'UNDO'}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return poll_pattern(cls, context) and poll_object_mode(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         from . import generation
@@ -318,13 +322,4 @@ CLASSES = (
 )
 
 
-def register() -> None:
-    """Make the operators known to Blender."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    """Take the operators back."""
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

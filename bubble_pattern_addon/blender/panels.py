@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import bpy
 
-from .properties import in_scene, is_outdated, is_pattern, pattern_objects, pattern_of
+from .field_panels import draw_field
+from .properties import in_scene, is_outdated, is_pattern, length_text, pattern_objects, pattern_of
 
 
 class SidebarPanel:
@@ -18,14 +19,22 @@ class SidebarPanel:
 
 
 class SettingsPanel(SidebarPanel):
-    """A part of the settings, shown while a pattern is there to be edited."""
+    """A part of the settings, shown while a pattern is there to be edited; `fields` names them."""
 
     bl_parent_id = "BUBBLE_PATTERN_PT_main"
+    fields: tuple[str, ...] = ()
+    if TYPE_CHECKING:  # what the panel itself brings
+        layout: bpy.types.UILayout
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         obj = pattern_of(context.active_object)
         return obj is not None and in_scene(obj.bubble_pattern.base) and not is_applied(obj)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        column = columns(self.layout)
+        for field in self.fields:
+            column.prop(shown_settings(context), field)
 
 
 def is_applied(obj: bpy.types.Object) -> bool:
@@ -156,8 +165,11 @@ class BUBBLE_PATTERN_PT_packing(SettingsPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         settings = shown_settings(context)
         column = columns(self.layout)
-        column.prop(settings, "pitch")
+        draw_field(column, settings, "pitch", "pitch_field", False, "Pitch")
         column.prop(settings, "edge_offset")
+        column.prop(settings, "orientation")
+        if settings.orientation == 'GIVEN':
+            column.prop(settings, "rows_along", text=" ")
         column.prop(settings, "seed")
 
 
@@ -167,13 +179,7 @@ class BUBBLE_PATTERN_PT_solver(SettingsPanel, bpy.types.Panel):
     bl_label = "Solver"
     bl_parent_id = "BUBBLE_PATTERN_PT_packing"
     bl_options = {'DEFAULT_CLOSED'}
-
-    def draw(self, context: bpy.types.Context) -> None:
-        settings = shown_settings(context)
-        column = columns(self.layout)
-        column.prop(settings, "integrator")
-        column.prop(settings, "iterations")
-        column.prop(settings, "tolerance")
+    fields = ("integrator", "iterations", "tolerance")
 
 
 class BUBBLE_PATTERN_PT_holes(SettingsPanel, bpy.types.Panel):
@@ -185,11 +191,20 @@ class BUBBLE_PATTERN_PT_holes(SettingsPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         settings = shown_settings(context)
         column = columns(self.layout)
-        column.prop(settings, "diameter")
+        share = settings.diameter_mode == 'SHARE'
+        draw_field(column, settings, "fill" if share else "diameter", "diameter_field", share, "Diameter")
+        column.row().prop(settings, "diameter_mode", text=" ", expand=True)
+        row = column.row(align=True)
+        row.operator("bubble_pattern.fix_sizes", icon='PINNED')
+        row.operator("bubble_pattern.free_sizes", icon='UNPINNED')
+        if settings.seeds:
+            column.label(text=f"{len(settings.seeds):,} fixed", icon='PINNED')
+            column.prop(settings, "solver")
         column.row().prop(settings, "depth_mode", expand=True)
         if settings.depth_mode == 'BLIND':
             column.prop(settings, "depth", text=" ")
         column.prop(settings, "sides", text="Sides (0 = Auto)")
+        column.prop(settings, "facet_tolerance")
         column.prop(settings, "wall_material")
 
 
@@ -199,12 +214,7 @@ class BUBBLE_PATTERN_PT_limits(SettingsPanel, bpy.types.Panel):
     bl_label = "Limits"
     bl_order = 3
     bl_options = {'DEFAULT_CLOSED'}
-
-    def draw(self, context: bpy.types.Context) -> None:
-        settings = shown_settings(context)
-        column = columns(self.layout)
-        column.prop(settings, "min_web")
-        column.prop(settings, "min_margin")
+    fields = ("min_web", "min_margin", "min_diameter")
 
 
 class BUBBLE_PATTERN_PT_preview(SettingsPanel, bpy.types.Panel):
@@ -213,12 +223,7 @@ class BUBBLE_PATTERN_PT_preview(SettingsPanel, bpy.types.Panel):
     bl_label = "Preview"
     bl_order = 4
     bl_options = {'DEFAULT_CLOSED'}
-
-    def draw(self, context: bpy.types.Context) -> None:
-        settings = shown_settings(context)
-        column = columns(self.layout)
-        column.prop(settings, "live")
-        column.prop(settings, "show_bubbles")
+    fields = ("live", "show_bubbles")
 
 
 class BUBBLE_PATTERN_PT_result(SettingsPanel, bpy.types.Panel):
@@ -231,11 +236,16 @@ class BUBBLE_PATTERN_PT_result(SettingsPanel, bpy.types.Panel):
         settings = shown_settings(context)
         self.layout.active = not is_outdated(settings)
         figures: list[tuple[str, str, bool]] = [("Features", f"{settings.count:,}", settings.count == 0)]
+        for name, count in (("Made Smaller", settings.shrunk), ("Left Out", settings.dropped)):
+            if count:
+                figures.append((name, f"{count:,}", False))
         if settings.count > 1:
-            figures.append(("Smallest Web", length(context, settings.web), settings.web < settings.min_web))
+            figures.append(
+                ("Smallest Web", length_text(context, settings.web), settings.web < settings.min_web)
+            )
         if settings.margin >= 0:
             margin = settings.margin
-            figures.append(("Smallest Margin", length(context, margin), margin < settings.min_margin))
+            figures.append(("Smallest Margin", length_text(context, margin), margin < settings.min_margin))
         figures.append(("Open Area", f"{settings.open_area:.1%}", False))
         if settings.six >= 0:
             figures.append(("Six Neighbors", f"{settings.six:.1%}", False))
@@ -250,16 +260,8 @@ class BUBBLE_PATTERN_PT_result(SettingsPanel, bpy.types.Panel):
             right = split.row()
             right.alert = alert
             right.label(text=figure)
-
-
-def length(context: bpy.types.Context, value: float) -> str:
-    """A length in the scene's unit."""
-    units = context.scene.unit_settings
-    return (
-        bpy.utils.units.to_string(units.system, 'LENGTH', value * units.scale_length, precision=4)
-        if (units.system != 'NONE')
-        else f"{value:.4g}"
-    )
+        if settings.notes:
+            sentences(self.layout, settings.notes, context.region.width, 'INFO')
 
 
 CLASSES: tuple[Any, ...] = (
@@ -273,13 +275,4 @@ CLASSES: tuple[Any, ...] = (
 )
 
 
-def register() -> None:
-    """Make the panels known to Blender."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    """Take the panels back."""
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -1,5 +1,5 @@
-"""The finished part as a Blender mesh that looks like its base: faces, materials, UV maps, sharpness,
-shading.
+"""The finished part as a Blender mesh that looks like its base: faces, materials, UV maps, vertex groups,
+sharpness, shading.
 
 Faces of the base that the features left alone stay as they were, quads and n-gons included. Where a face was
 cut, the values at the new corners are taken from the source triangle by their barycentric coordinates, the
@@ -33,6 +33,7 @@ from .attributes import (
 from .part_edges import Edges, find_edges
 from .provenance import Origin, Original, trace, trace_edges
 from .reading import Base, transformed
+from .vertex_groups import write_groups
 
 if TYPE_CHECKING:
     from ..core.solid import Part
@@ -55,6 +56,7 @@ def build_part_mesh(
     try:
         edges = lay_geometry(mesh, original, origin)
         carry_layers(mesh, original, origin, edges)
+        carry_groups(mesh, original, origin)
         lay_materials(mesh, original, origin, wall_material)
         lay_sharp_edges(mesh, origin, edges)
         if original.corner_normal is not None:
@@ -106,6 +108,25 @@ def carry_layers(mesh: bpy.types.Mesh, original: Original, origin: Origin, edges
         else:
             values = point_values(layer, origin)
         write_layer(mesh, replace(layer, values=values))
+
+
+def carry_groups(mesh: bpy.types.Mesh, original: Original, origin: Origin) -> None:
+    """Give the part the vertex groups of its base, with weights in between where it was cut.
+
+    The base's own vertices are in the same groups as before; a new one is in those that weigh something
+    there.
+    """
+    carried = []
+    for group in original.groups:
+        weight = np.zeros(len(original.position), dtype=np.float32)
+        member = np.zeros(len(weight), dtype=bool)
+        weight[group.members], member[group.members] = group.weights, True
+        values = point_values(Layer(group.name, 'POINT', 'FLOAT', weight), origin)
+        inside = np.where(origin.vertex >= 0, member[origin.vertex], values > 0)
+        rows = np.flatnonzero(inside)
+        carried.append(replace(group, members=rows, weights=values[rows]))
+    if carried:
+        write_groups(mesh, carried)
 
 
 def face_values(layer: Layer, origin: Origin) -> Array:

@@ -23,6 +23,7 @@ from .attributes import (
 )
 from .part_edges import Edges
 from .reading import Base
+from .vertex_groups import VertexGroup, read_groups
 
 if TYPE_CHECKING:
     from ..core.solid import Part
@@ -36,8 +37,8 @@ class Original:
     """What a part inherits from the evaluated mesh of its base.
 
     position (V, 3), loop_start and loop_total (P,), loop_vertex and loop_edge (L,), corner_normal (L, 3) or
-    None where the base is flat throughout; layers: its attributes; materials by index; active: names of the
-    active UV map and colour, and of those for rendering
+    None where the base is flat throughout; layers: its attributes; groups: its vertex groups; materials by
+    index; active: names of the active UV map and colour, and of those for rendering
     """
 
     position: Array
@@ -47,6 +48,7 @@ class Original:
     loop_edge: Ints
     corner_normal: Array | None
     layers: tuple[Layer, ...]
+    groups: tuple[VertexGroup, ...]
     materials: tuple[bpy.types.Material | None, ...]
     active: tuple[str, str, str, str]
 
@@ -68,6 +70,7 @@ def read_original(obj: bpy.types.Object, mesh: bpy.types.Mesh) -> Original:
         loop_edge=read_named(mesh, CORNER_EDGE, len(mesh.loops)).astype(np.int64),
         corner_normal=read_values(mesh.corner_normals, "vector", np.float32, 3) if smooth else None,
         layers=tuple(read_layers(mesh)),
+        groups=read_groups(obj, mesh),
         materials=tuple(materials),
         active=(
             (uv or [""])[0],

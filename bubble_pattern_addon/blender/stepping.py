@@ -22,6 +22,7 @@ def status_of(shown: Latest) -> Callable[[bpy.types.Header, bpy.types.Context], 
     """A function that draws progress in the status bar; a bound method Blender would not take."""
 
     def draw(header: bpy.types.Header, _context: bpy.types.Context) -> None:
+        """Draw a bar with the stage's name, and the key that cancels."""
         progress = shown.latest
         row = header.layout.row(align=True)
         bar = row.row()
@@ -40,9 +41,10 @@ class Latest:
 
 
 class SteppedOperator:
-    """Mixin for an operator whose `steps` is a generator of Progress; `done` gets its result."""
+    """Mixin for an operator whose `steps` is a generator of Progress; `done` gets what it returns."""
 
     def steps(self, context: bpy.types.Context) -> Steps[Any]:
+        """The work. Raises PatternError, which is reported; closed early, it leaves everything as it was."""
         raise NotImplementedError
 
     if TYPE_CHECKING:  # what the operator itself brings
@@ -58,7 +60,7 @@ class SteppedOperator:
         try:
             result = drive(self.steps(context))
         except PatternError as error:
-            return self.refuse(error)
+            return self.refuse(error, context)
         self.done(context, result)
         return {'FINISHED'}
 
@@ -105,16 +107,16 @@ class SteppedOperator:
             self.done(context, end.value)
             return {'FINISHED'}
         except PatternError as error:
-            return self.refuse(error)
+            return self.refuse(error, context)
         except BaseException:
             if hasattr(self, "_timer"):
                 self.tidy(context)
             raise
         return None
 
-    def refuse(self, error: PatternError) -> set[str]:
+    def refuse(self, error: PatternError, context: bpy.types.Context) -> set[str]:
         """Report what the user can mend."""
-        self.report({'ERROR'}, spoken(error))
+        self.report({'ERROR'}, spoken(error, context))
         return {'CANCELLED'}
 
     def tidy(self, context: bpy.types.Context) -> None:

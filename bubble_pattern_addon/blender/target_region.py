@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import bpy
 import numpy as np
 
@@ -57,3 +60,22 @@ def wanted_faces(base: bpy.types.Object, name: str, only_selected: bool) -> Arra
     if marked is not None and marked.any():
         return marked
     return np.ones(len(base.data.polygons), dtype=bool)
+
+
+@contextmanager
+def trying_region(base: bpy.types.Object, name: str) -> Iterator[None]:
+    """Object Mode of `base`, to mark other faces by the attribute `name` and see what comes of it.
+
+    Where the block ends in an error or is cancelled, marks and mode are as they were before.
+    """
+    editing = base.mode == 'EDIT'
+    if editing:
+        bpy.ops.object.mode_set(mode='OBJECT')
+    before = stored(base, name)
+    try:
+        yield
+    except BaseException:
+        store(base, name, before)
+        if editing:
+            bpy.ops.object.mode_set(mode='EDIT')
+        raise

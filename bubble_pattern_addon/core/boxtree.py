@@ -61,8 +61,8 @@ def _by_twos(values: Floats, merge: np.ufunc) -> Floats:
 
 
 def meeting(tree: BoxTree, questions: int, overlap: Overlap) -> tuple[Ints, Ints]:
-    """All pairs (question, triangle) that `overlap` lets pass on every level looked at; sorted by question,
-    then triangle.
+    """All pairs (question 0 .. questions-1, triangle) that `overlap` lets pass on every level looked at: (m,)
+    and (m,), sorted by question, then triangle.
     """
     top = len(tree.middle) - 1
     box = np.arange(tree.middle[top - top % 2].shape[1])
@@ -82,8 +82,9 @@ def meeting(tree: BoxTree, questions: int, overlap: Overlap) -> tuple[Ints, Ints
 
 
 def meeting_cylinders(tree: BoxTree, start: Floats, end: Floats, radius: Floats) -> tuple[Ints, Ints]:
-    """Pairs (cylinder, triangle) whose boxes may meet: cylinders from `start` to `end`, (n, 3), of `radius`
-    (n,).
+    """Pairs (cylinder, triangle) that may meet, (m,) and (m,), sorted; those left out do not.
+
+    Cylinders run from `start` to `end`, (n, 3), not at the same place, with `radius`, (n,).
     """
     axis = end - start
     length = np.linalg.norm(axis, axis=1)
@@ -92,6 +93,11 @@ def meeting_cylinders(tree: BoxTree, start: Floats, end: Floats, radius: Floats)
     reach = np.ascontiguousarray((np.abs(axis) / 2 + radius[:, None]).T)
 
     def overlap(which: Ints, box: Ints, middle: Floats, half: Floats) -> Bools:
+        """May the `box`, (m,), of this level's middles and half sizes meet the cylinder `which`, (m,)?
+
+        It may where the boxes round both overlap, and the ball round the triangles' box is no farther from
+        the cylinder's axis than both radii.
+        """
         near = np.ones(len(which), dtype=bool)
         height, square, size = np.zeros((3, len(which)))
         for k in range(3):

@@ -18,6 +18,7 @@ def same_places(known: Floats, points: Floats) -> tuple[Ints, Ints]:
     ranked = keys[order]
 
     def find(places: Floats, asked: np.ndarray) -> Ints:
+        """Row of `known` at each of `places`, (n, 3), whose keys are `asked`, (n,): (n,), -1 for none."""
         rank = np.minimum(np.searchsorted(ranked, asked), len(known) - 1)
         found = np.flatnonzero(ranked[rank] == asked)
         row = order[rank[found]]

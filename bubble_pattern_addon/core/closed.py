@@ -76,7 +76,7 @@ def _pair_up(ranked: Ints) -> bool:
 
 
 def is_closed(triangles: Ints) -> bool:
-    """Is every edge shared by exactly two triangles that run along it in opposite directions?"""
+    """Is every edge shared by exactly two of `triangles`, (T, 3), that run along it in opposite ways?"""
     return _pair_up(np.sort(edge_keys(triangles)[0]))
 
 
@@ -129,7 +129,7 @@ def _vertex_shells(low: Ints, high: Ints) -> tuple[Ints, Bools]:
 
 
 def euler_number(triangles: Ints) -> int:
-    """V - E + F of a closed surface, whose edges are 3/2 of its faces."""
+    """V - E + F of the closed surface `triangles`, (T, 3), whose edges are 3/2 of its faces."""
     used = np.zeros(int(triangles.max()) + 1 if len(triangles) else 0, dtype=bool)
     used[triangles] = True
     return int(used.sum()) - len(triangles) * 3 // 2 + len(triangles)

@@ -10,7 +10,10 @@ from .pattern import Pattern
 
 
 def colliding(pattern: Pattern, chosen: Ints, top: Floats, bottom: Floats) -> Ints:
-    """Those of the features `chosen` whose cutters run into one another, as on a strongly curved, thick wall.
+    """Those of the features `chosen`, (m,), whose cutters run into one another, as on a strongly curved,
+    thick wall, (k,).
+
+    top, bottom: (n,) for all features, how far each cutter reaches above and below its centre
 
     Two cylinders are apart if some direction separates them; the ones tried are both axes and the shortest
     line between the axes.

@@ -22,8 +22,10 @@ COLUMNS = ("id", "x", "y", "z", "nx", "ny", "nz", "diameter", "pitch", "row")
 def write_features(path: Path, pattern: Pattern) -> None:
     """The hole table as CSV, one line per feature in the order of ids, with the columns COLUMNS.
 
+    An id is the number of the feature's bubble: it stays when the limits leave out other features.
     x, y, z is the centre on the surface, nx, ny, nz the unit normal there, outward; lengths in the unit of
-    the base. Numbers are written so that they read back as the same double.
+    the base. Numbers are written so that they read back as the same double. OSError where the file can't be
+    written.
     """
     numbers = np.column_stack([pattern.position, pattern.normal, pattern.diameter, pattern.pitch])
     with path.open("w", newline="", encoding="utf-8") as file:
@@ -31,17 +33,19 @@ def write_features(path: Path, pattern: Pattern) -> None:
         table.writerow(COLUMNS)
         table.writerows(
             [number, *values, row]
-            for number, (values, row) in enumerate(zip(numbers.tolist(), pattern.row.tolist(), strict=True))
+            for number, values, row in zip(
+                pattern.ids.tolist(), numbers.tolist(), pattern.row.tolist(), strict=True
+            )
         )
 
 
 def make_report(region: Region, pattern: Pattern, part: Part, seconds: Mapping[str, float]) -> dict[str, Any]:
-    """The figures of a run, ready for JSON; a figure with nothing to measure is None.
+    """The figures of a run in the unit of the base, ready for JSON; one with nothing to measure is None.
 
     features, watertight, genus, volume, open_area, min_web, min_margin, quality{six, psi6, gap_cv, gap_min,
     rim_cv} and seconds{region, pack, shape, add}; further wall{min, max}, the near wall's thickness at the
-    features, problems, one sentence each, empty when the part is good, and notes, likewise, on what does no
-    harm.
+    features, limits (see limits_report), problems, one sentence each, empty when the part is good, and notes,
+    likewise, on what does no harm.
     """
     figures: Quality = measure(pattern, region)
     thickness = part.thickness[np.isfinite(part.thickness)]
@@ -57,6 +61,7 @@ def make_report(region: Region, pattern: Pattern, part: Part, seconds: Mapping[s
         "open_area": open_area(pattern, region),
         "min_web": min_web(pattern),
         "min_margin": min_margin(pattern, region),
+        "limits": limits_report(pattern),
         "wall": {
             "min": float(thickness.min()) if len(thickness) else math.nan,
             "max": float(thickness.max()) if len(thickness) else math.nan,
@@ -70,11 +75,28 @@ def make_report(region: Region, pattern: Pattern, part: Part, seconds: Mapping[s
         },
         "seconds": {stage: round(value, 4) for stage, value in seconds.items()},
         "problems": list(part.check.problems),
-        "notes": list(part.check.notes),
+        "notes": [*part.check.notes, *pattern.notes],
     }
     cleaned = _without_nonsense(report)
     assert isinstance(cleaned, dict)
     return cleaned
+
+
+def limits_report(pattern: Pattern) -> dict[str, Any]:
+    """What the limits did: how many features they made smaller (shrunk) and left out (dropped), the ids of
+    both, the smallest share that is left of a shrunk one's diameter, and where the dropped ones would be.
+    """
+    shrunk = pattern.shrunk
+    dropped = pattern.dropped
+    wished = pattern.diameter if pattern.wished is None else pattern.wished
+    return {
+        "shrunk": len(shrunk),
+        "dropped": 0 if dropped is None else len(dropped),
+        "smallest_share": float((pattern.diameter[shrunk] / wished[shrunk]).min(initial=1.0)),
+        "shrunk_ids": pattern.ids[shrunk].tolist(),
+        "dropped_ids": [] if dropped is None else dropped.ids.tolist(),
+        "dropped_at": [] if dropped is None else dropped.position.tolist(),
+    }
 
 
 def _without_nonsense(value: Any) -> Any:
@@ -87,5 +109,5 @@ def _without_nonsense(value: Any) -> Any:
 
 
 def write_report(path: Path, report: Mapping[str, Any]) -> None:
-    """The report as JSON."""
+    """The report as JSON. OSError where the file can't be written."""
     path.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")

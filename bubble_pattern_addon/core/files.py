@@ -17,8 +17,10 @@ import numpy as np
 import trimesh
 
 from .errors import BaseError, OutputError
-from .mesh import Bools, Mesh
+from .mesh import Bools, Floats, Mesh
+from .paint import painted
 from .region import weld
+from .surroundings import Thing
 from .threemf import Piece, read_3mf, write_3mf
 
 SUFFIXES = (".stl", ".obj", ".ply", ".3mf", ".glb", ".gltf")
@@ -31,11 +33,17 @@ class LoadedBase:
 
     mesh: triangles on vertices welded by position, in the file's own unit and axes
     attributes, materials: name -> mask (T,) of the triangles that carry it
+    values: name -> what is painted on the base, (T,) on faces, (T, 3) or (T, 3, channels) at corners
+    uv_maps: name -> (T, 3, 2)
+    objects: name -> what stands beside the base
     """
 
     mesh: Mesh
     attributes: Mapping[str, Bools] = field(default_factory=dict)
     materials: Mapping[str, Bools] = field(default_factory=dict)
+    values: Mapping[str, Floats] = field(default_factory=dict, kw_only=True)
+    uv_maps: Mapping[str, Floats] = field(default_factory=dict, kw_only=True)
+    objects: Mapping[str, Thing] = field(default_factory=dict, kw_only=True)
 
 
 # -- in ------------------------------------------------------------------------------------------------------
@@ -53,7 +61,7 @@ def load_base(path: Path) -> LoadedBase:
     if path.suffix.lower() not in SUFFIXES:
         raise BaseError(f"Base {path.name} has a suffix that is not known: save it as {SHOWN}")
     try:
-        pieces, attributes = _read(path)
+        pieces = _read(path)
     except OSError as error:
         raise BaseError(f"Base {path} can't be read: {error.strerror or error}") from None
     except Exception as error:  # whatever a parser does on a file that breaks its format's rules
@@ -67,23 +75,23 @@ def load_base(path: Path) -> LoadedBase:
     _check_numbers(mesh, path)
     names = np.concatenate([piece.material for piece in pieces])
     materials = {str(name): names == name for name in np.unique(names) if name}
-    return LoadedBase(weld(mesh), attributes, materials)
+    values = _laid_end_to_end([piece.values for piece in pieces], pieces)
+    masks = {name: column != 0 for name, column in values.items() if column.ndim == 1}
+    uv_maps = _laid_end_to_end([piece.uv_maps for piece in pieces], pieces)
+    return LoadedBase(weld(mesh), masks, materials, values=values, uv_maps=uv_maps)
 
 
-def _read(path: Path) -> tuple[list[Piece], dict[str, Bools]]:
+def _read(path: Path) -> list[Piece]:
     if path.suffix.lower() == ".3mf":
-        return read_3mf(path), {}
+        return read_3mf(path)
     scene = _obj_scene(path) if path.suffix.lower() == ".obj" else trimesh.load_scene(path, process=False)
     pieces: list[Piece] = []
-    attributes: dict[str, Bools] = {}
     for node in sorted(scene.graph.nodes_geometry):
         matrix, geometry_name = scene.graph[node]
         geometry = scene.geometry[geometry_name]
         if isinstance(geometry, trimesh.Trimesh):  # points and curves have no faces
             pieces.append(_placed(geometry, np.asarray(matrix, dtype=np.float64)))
-            attributes = _ply_attributes(geometry)
-    # attributes come in PLY files only, which hold one mesh
-    return pieces, attributes if len(pieces) == 1 else {}
+    return pieces
 
 
 def _obj_scene(path: Path) -> trimesh.Scene:
@@ -102,26 +110,28 @@ def _obj_scene(path: Path) -> trimesh.Scene:
 def _placed(geometry: trimesh.Trimesh, matrix: np.ndarray[Any, np.dtype[np.float64]]) -> Piece:
     vertices = np.asarray(geometry.vertices, dtype=np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
     triangles = np.asarray(geometry.faces, dtype=np.int64)
+    values, uv_maps = painted(geometry)
     if np.linalg.det(matrix[:3, :3]) < 0:  # a mirrored piece would be inside out
         triangles = triangles[:, ::-1]
+        values = {name: column[:, ::-1] if column.ndim > 1 else column for name, column in values.items()}
+        uv_maps = {name: column[:, ::-1] for name, column in uv_maps.items()}
     name = getattr(getattr(geometry.visual, "material", None), "name", None) or ""
-    return Piece(Mesh(vertices, triangles), np.full(len(triangles), str(name)))
+    return Piece(Mesh(vertices, triangles), np.full(len(triangles), str(name)), values, uv_maps)
 
 
-def _ply_attributes(geometry: trimesh.Trimesh) -> dict[str, Bools]:
-    """Scalar face properties of a PLY file as masks; none where polygons were split into triangles."""
-    face = geometry.metadata.get("_ply_raw", {}).get("face", {}).get("data")
-    # text files give a dict of columns, binary ones a structured array
-    columns = face if isinstance(face, dict) else getattr(getattr(face, "dtype", None), "names", None)
-    masks = {}
-    for name in columns or ():
-        try:
-            values = np.squeeze(np.asarray(face[name]))
-        except ValueError:  # polygons of several lengths
-            continue
-        if values.shape == (len(geometry.faces),) and np.issubdtype(values.dtype, np.number):
-            masks[str(name)] = values != 0
-    return masks
+def _laid_end_to_end(columns: list[Mapping[str, Floats]], pieces: list[Piece]) -> dict[str, Floats]:
+    """Values of all pieces by name; nan where a piece has none of that name, 0 on its faces."""
+    found: dict[str, Floats] = {}
+    for name in dict.fromkeys(name for column in columns for name in column):
+        like = next(column[name] for column in columns if name in column)
+        parts = [
+            column[name]
+            if name in column and column[name].shape[1:] == like.shape[1:]
+            else np.full((len(piece.mesh.triangles), *like.shape[1:]), np.nan if like.ndim > 1 else 0.0)
+            for column, piece in zip(columns, pieces, strict=True)
+        ]
+        found[name] = np.concatenate(parts)
+    return found
 
 
 def _joined(pieces: list[Piece]) -> Mesh:
@@ -148,7 +158,10 @@ def _check_numbers(mesh: Mesh, path: Path) -> None:
 
 
 def write_mesh(path: Path, mesh: Mesh) -> None:
-    """The mesh in the format of the path's suffix (one of SUFFIXES): STL is binary, 3MF says millimetres."""
+    """The mesh in the format of the path's suffix (one of SUFFIXES): STL is binary, 3MF says millimetres.
+
+    Coordinates are written as they are, in the unit of the base. OSError where the file can't be written.
+    """
     if path.suffix.lower() == ".3mf":
         write_3mf(path, mesh, path.stem)
         return

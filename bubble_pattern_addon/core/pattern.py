@@ -2,22 +2,35 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
-from .mesh import Floats, Ints
+import numpy as np
+
+from .mesh import Bools, Floats, Ints
 from .metric import Places
+
+COLUMNS = ("normal", "tangent", "pitch", "diameter", "row")
+
+# Diameters that differ by a smaller share are the same.
+SAME = 1e-9
 
 
 @dataclass(frozen=True)
 class Pattern:
-    """Bubbles in a stable order; a feature's id is its row number here.
+    """Features in a stable order.
 
-    places: where the bubbles are on the base, n of them
+    places: where they are on the base, n of them
     normal: (n, 3) unit surface normals, outward
     tangent: (n, 3) unit vectors in the surface, along a row of the hexagonal arrangement
     pitch: (n,) packing metric at the bubble: the diameter of its territory
-    diameter: (n,) size of the feature, from the shaping metric
+    diameter: (n,) size of the feature, from the shaping metric, within the limits
     row: (n,) 0 for the first row along a boundary, 1 for the next, ...
+    wished: (n,) the size that the shaping metric asked for; None where nothing is known of it
+    bubble: (n,) number of the feature's bubble, rising; None where every bubble has a feature
+    dropped: the bubbles whose feature was left out as too small; None where none was
+    notes: what a designer should know of the sizes, one sentence each
     """
 
     places: Places
@@ -26,6 +39,10 @@ class Pattern:
     pitch: Floats
     diameter: Floats
     row: Ints
+    wished: Floats | None = None
+    bubble: Ints | None = None
+    dropped: Pattern | None = None
+    notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.pitch)
@@ -34,3 +51,85 @@ class Pattern:
     def position(self) -> Floats:
         """Centres on the surface, (n, 3)."""
         return self.places.position
+
+    @property
+    def ids(self) -> Ints:
+        """A feature's id, (n,): the number of its bubble, whatever becomes of the other features."""
+        return np.arange(len(self)) if self.bubble is None else self.bubble
+
+    @property
+    def shrunk(self) -> Ints:
+        """Rows of the features that the limits made smaller than the shaping metric asked for."""
+        if self.wished is None:
+            return np.empty(0, dtype=np.int64)
+        return np.flatnonzero(self.diameter < self.wished * (1 - SAME))
+
+
+def split(bubbles: Pattern, kept: Bools) -> Pattern:
+    """The pattern of the bubbles `kept` (n,), the others in `dropped`."""
+    if kept.all():
+        return bubbles
+    return replace(take(bubbles, kept), dropped=take(bubbles, ~kept))
+
+
+def all_bubbles(pattern: Pattern) -> Pattern:
+    """Every bubble of the pattern in the order of packing, those whose feature was left out among them."""
+    if pattern.dropped is None:
+        return pattern
+    both = _end_to_end((pattern, pattern.dropped))
+    order = np.argsort(both.ids)
+    ids = both.ids[order]
+    bubble = None if np.array_equal(ids, np.arange(len(ids))) else ids
+    return replace(take(both, order), bubble=bubble, notes=pattern.notes)
+
+
+def joined(patterns: Sequence[Pattern]) -> Pattern:
+    """Patterns on one base as one, at least one of them; the ids of each go on from those before it."""
+    if len(patterns) == 1:
+        return patterns[0]
+    numbered: list[Pattern] = []
+    first = 0
+    for pattern in patterns:
+        parts = [part for part in (pattern, pattern.dropped) if part is not None]
+        numbered.append(replace(pattern, bubble=pattern.ids + first))
+        if pattern.dropped is not None:
+            dropped = replace(pattern.dropped, bubble=pattern.dropped.ids + first)
+            numbered[-1] = replace(numbered[-1], dropped=dropped)
+        first += 1 + max(int(part.ids.max(initial=-1)) for part in parts)
+    left_out = [pattern.dropped for pattern in numbered if pattern.dropped is not None]
+    return replace(
+        _end_to_end(numbered),
+        dropped=_end_to_end(left_out) if left_out else None,
+        notes=tuple(dict.fromkeys(note for pattern in patterns for note in pattern.notes)),
+    )
+
+
+def _end_to_end(parts: Sequence[Pattern]) -> Pattern:
+    """The features of all parts with their ids, without what was left out."""
+
+    def column(name: str) -> Any:
+        return np.concatenate([getattr(part, name) for part in parts])
+
+    places = [part.places for part in parts]
+    names = ("position", "triangle", "barycentric")
+    known = any(part.wished is not None for part in parts)
+    wished = [part.diameter if part.wished is None else part.wished for part in parts]
+    return Pattern(
+        Places(*(np.concatenate([getattr(place, name) for place in places]) for name in names)),
+        **{name: column(name) for name in COLUMNS},
+        wished=np.concatenate(wished) if known else None,
+        bubble=column("ids"),
+    )
+
+
+def take(pattern: Pattern, which: Bools | Ints) -> Pattern:
+    """The features `which`, a mask (n,) or rows, with their ids."""
+    places = pattern.places
+    return replace(
+        pattern,
+        places=Places(places.position[which], places.triangle[which], places.barycentric[which]),
+        **{name: getattr(pattern, name)[which] for name in COLUMNS},
+        wished=None if pattern.wished is None else pattern.wished[which],
+        bubble=pattern.ids[which],
+        dropped=None,
+    )

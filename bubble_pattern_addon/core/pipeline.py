@@ -2,78 +2,90 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
+from .errors import RegionError
+from .links import Links, find_links
 from .mesh import Floats, Ints
-from .metric import Places
-from .packing.bubbles import all_spots
-from .packing.force import find_pairs
+from .metric import Bound, Constant, Field, Places
 from .packing.pack import local_pitch, pack_steps
 from .pattern import Pattern
 from .progress import Progress, Steps
 from .recipe import Recipe
 from .region import Region
-from .shaping import diameters
+from .shaping import bound, shaped
 from .surface import Charts, Spots, positions, smooth_normals, to_frame, to_space
-
-# Bubbles closer than this many stable distances are in neighbouring rows, or in the same.
-TOUCHING = 1.35
+from .surroundings import NOTHING, Surroundings
 
 
-def pattern_steps(region: Region, recipe: Recipe) -> Steps[Pattern]:
+def pattern_steps(region: Region, recipe: Recipe, surroundings: Surroundings = NOTHING) -> Steps[Pattern]:
     """Pattern of `recipe` in `region`: packs the bubbles (step 1) and shapes their features (step 2).
 
+    surroundings: what the recipe's fields ask for beside the region itself (see field_tables.wanted)
+
     Raises RegionError where the pitch does not suit the region, RecipeError where the diameter does not suit
-    the pitch.
+    the pitch, FieldError where the surroundings lack what a field asks for.
     """
-    ground, bubbles = yield from pack_steps(region, recipe.packing)
+    surroundings = replace(surroundings, region=region)
+    metric = bound(recipe.packing.pitch, surroundings, "[packing] pitch")
+    _check_lengths(region, metric, "pitch")
+    # a number stays one: there are quick ways to pack with the same pitch everywhere
+    pitch_there = metric if isinstance(metric, Constant) else Bound(metric)
+    ground, bubbles = yield from pack_steps(region, replace(recipe.packing, pitch=pitch_there))
     yield Progress("Shaping the features", 0.95)
-    spots = all_spots(ground, bubbles)
+    spots = bubbles.spots
     pitch = local_pitch(ground, bubbles)
     points = positions(ground.charts, spots)
     places = Places(points, region.triangles[spots.row], spots.barycentric)
-    first = len(bubbles.first_row.arc) + bubbles.held
-    links = _links(ground.charts, spots, points, pitch)
+    links = find_links(ground.charts, points, spots.row, pitch)
     normal = smooth_normals(region, spots)
-    return Pattern(
+    packed = Pattern(
         places=places,
         normal=normal,
         tangent=_tangents(ground.charts, spots, points, links, normal),
         pitch=pitch,
-        diameter=diameters(recipe.shaping, places, pitch),
-        row=_rows(links, len(pitch), first),
+        diameter=np.zeros(len(pitch)),
+        row=_rows(links, len(pitch), bubbles.fixed),
     )
+    return shaped(packed, links, region, recipe, surroundings)
 
 
-def _links(charts: Charts, spots: Spots, points: Floats, pitch: Floats) -> tuple[Ints, Ints]:
-    pairs = find_pairs(charts, points, spots.row, pitch, 0.0)
-    distance = np.linalg.norm(points[pairs.first] - points[pairs.second], axis=1)
-    near = distance < TOUCHING * pairs.stable
-    return pairs.first[near], pairs.second[near]
+def _check_lengths(region: Region, field: Field, name: str) -> None:
+    """RegionError where a field is no positive length at some corner of the region's triangles."""
+    corners = np.tile(np.eye(3), (len(region.triangles), 1))
+    places = Places(region.corners.reshape(-1, 3), np.repeat(region.triangles, 3), corners)
+    values = field(places)
+    bad = ~(np.isfinite(values) & (values > 0))
+    if bad.any():
+        x, y, z = places.position[bad][0]
+        raise RegionError(
+            f"The {name} is {values[bad][0]:.4g} at {x:.4g}, {y:.4g}, {z:.4g}: it must be a positive length "
+            "everywhere in the target region"
+        )
 
 
-def _rows(links: tuple[Ints, Ints], n: int, first: int) -> Ints:
+def _rows(links: Links, n: int, first: int) -> Ints:
     """Row of every bubble (n,): 0 for the `first` bubbles along the boundary, else the steps from there; -1
     where no boundary can be reached.
     """
     if not first:
         return np.full(n, -1)
-    graph = coo_array((np.ones(len(links[0])), links), shape=(n, n)).tocsr()
+    graph = coo_array((np.ones(len(links.first)), links[:2]), shape=(n, n)).tocsr()
     steps = dijkstra(graph, directed=False, indices=np.arange(first), unweighted=True, min_only=True)
     return np.where(np.isfinite(steps), steps, -1).astype(np.int64)
 
 
-def _tangents(
-    charts: Charts, spots: Spots, points: Floats, links: tuple[Ints, Ints], normal: Floats
-) -> Floats:
+def _tangents(charts: Charts, spots: Spots, points: Floats, links: Links, normal: Floats) -> Floats:
     """Unit vectors (n, 3) along a row of the arrangement: of its six directions the one nearest to the x
     axis.
     """
     n = len(points)
     six = np.zeros(n, dtype=np.complex128)
-    for own, other in (links, links[::-1]):
+    for own, other in ((links.first, links.second), (links.second, links.first)):
         towards = to_frame(charts, spots.row[own], points[other] - points[own])
         towards = (towards / np.maximum(np.abs(towards), 1e-300)) ** 6
         six += np.bincount(own, towards.real, n) + 1j * np.bincount(own, towards.imag, n)

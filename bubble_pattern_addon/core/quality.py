@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
+from .distance import boundary_distance
 from .mesh import Bools, Floats, Ints
 
 if TYPE_CHECKING:
@@ -95,7 +96,9 @@ def measure_points(
 
 
 def min_web(pattern: Pattern) -> float:
-    """Least material between features of one sheet, |xi - xj| - (di + dj) / 2; inf without neighbours."""
+    """Least material between features of one sheet, |xi - xj| - (di + dj) / 2, a length in the unit of the
+    base, below 0 where they overlap; inf without neighbours.
+    """
     near = neighbours(pattern.position, pattern.normal, pattern.pitch)
     if not len(near.first):
         return np.inf
@@ -104,7 +107,9 @@ def min_web(pattern: Pattern) -> float:
 
 
 def min_margin(pattern: Pattern, region: Region) -> float:
-    """Least distance from a feature's edge to the region's boundary; inf when there is no such pair."""
+    """Least distance from a feature's edge to the region's boundary, in the unit of the base, below 0 where
+    it is crossed; inf when there is no such pair.
+    """
     if not len(pattern) or not len(region.boundary_segments):
         return np.inf
     distance = boundary_distance(pattern.position, region.boundary_segments)
@@ -112,7 +117,7 @@ def min_margin(pattern: Pattern, region: Region) -> float:
 
 
 def open_area(pattern: Pattern, region: Region) -> float:
-    """Share of the region's area that the features, as circles of their diameter, take."""
+    """Share of the region's area, 0 to 1, that the features take, as circles of their diameter."""
     return float(np.pi / 4 * (pattern.diameter**2).sum() / region.area)
 
 
@@ -182,7 +187,7 @@ def _star(
     offset = position[other] - position[rows, None]
     flat = np.matmul(offset, axes[rows].swapaxes(1, 2))
     length = np.sqrt(flat[..., 0] ** 2 + flat[..., 1] ** 2)
-    near = (distance <= HORIZON * size) & _same_sheet(offset, normal[rows, None], normal[other], distance)
+    near = (distance <= HORIZON * size) & same_sheet(offset, normal[rows, None], normal[other], distance)
     seen = near & (length > 0)
     flat *= (distance / np.where(seen, length, 1.0) / size)[..., None]
     cell, radius = _bounds_cell(flat, seen)
@@ -194,58 +199,6 @@ def _star(
     return (i, other[i, j], distance[i, j], angle), sure
 
 
-def boundary_distance(points: Floats, segments: Floats) -> Floats:
-    """Distance of every point to the nearest of the boundary's segments, (n,); inf when there are none.
-
-    points: (n, 3); segments: (S, 2, 3). Exact: the segments are cut into short pieces; the pieces with the
-    nearest midpoints are measured, more of them until none left out can be nearer.
-    """
-    best = np.full(len(points), np.inf)
-    if not len(segments) or not len(points):
-        return best
-    pieces = _short_pieces(segments)
-    middle = pieces.mean(axis=1)
-    half = np.linalg.norm(pieces[:, 1] - pieces[:, 0], axis=1).max() / 2
-    tree = cKDTree(middle)
-    open_rows = np.arange(len(points))
-    k = min(4, len(pieces))
-    while len(open_rows):
-        step = max(1, 1_000_000 // k)
-        beyond = np.empty(len(open_rows))
-        for start in range(0, len(open_rows), step):
-            rows = open_rows[start : start + step]
-            reach, piece = tree.query(points[rows], np.arange(1, k + 1))
-            best[rows] = _point_segment(points[rows, None], pieces[piece]).min(axis=1)
-            beyond[start : start + step] = reach[:, -1] - half
-        open_rows = open_rows[beyond < best[open_rows]] if k < len(pieces) else open_rows[:0]
-        k = min(2 * k, len(pieces))
-    return best
-
-
-def _short_pieces(segments: Floats) -> Floats:
-    """The same line in pieces of about even length, (P, 2, 3), at most about twice as many as segments."""
-    a, b = segments[:, 0], segments[:, 1]
-    length = np.linalg.norm(b - a, axis=1)
-    longest = length.sum() / max(len(segments), 64)
-    count = np.maximum(np.ceil(length / longest), 1).astype(int) if longest > 0 else np.ones(len(a), int)
-    owner = np.repeat(np.arange(len(a)), count)
-    index = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
-    start = (index / count[owner])[:, None]
-    end = ((index + 1) / count[owner])[:, None]
-    along = (b - a)[owner]
-    return np.stack([a[owner] + start * along, a[owner] + end * along], axis=1)
-
-
-def _point_segment(points: Floats, segments: Floats) -> Floats:
-    """Distances of points (..., 3) to segments (..., 2, 3), broadcast."""
-    a = segments[..., 0, :]
-    along = segments[..., 1, :] - a
-    to = points - a
-    squared = np.einsum("...c,...c->...", along, along)
-    share = np.einsum("...c,...c->...", to, along) / np.where(squared > 0, squared, 1.0)
-    return np.linalg.norm(to - np.clip(share, 0.0, 1.0)[..., None] * along, axis=-1)
-
-
 def _tangent_axes(normal: Floats) -> Floats:
     """Two unit vectors across every unit normal, (n, 2, 3), right-handed with it."""
     least = np.eye(3)[np.abs(normal).argmin(axis=1)]
@@ -254,7 +207,7 @@ def _tangent_axes(normal: Floats) -> Floats:
     return np.stack([first, np.cross(normal, first)], axis=1)
 
 
-def _same_sheet(offset: Floats, normal: Floats, other: Floats, distance: Floats) -> Bools:
+def same_sheet(offset: Floats, normal: Floats, other: Floats, distance: Floats) -> Bools:
     """Whether bubbles `offset` away with normals `other` lie on the sheet of those with `normal`, (n, k).
 
     Along an arc the chord is perpendicular to the mean of the two normals, whatever the curvature; between

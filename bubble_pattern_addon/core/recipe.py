@@ -8,8 +8,6 @@ Lengths are in the unit of the base (metres inside Blender), angles in degrees.
 
 from __future__ import annotations
 
-import difflib
-import json
 import math
 import tomllib
 from collections.abc import Callable, Mapping
@@ -17,10 +15,30 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
+from .blending import Fill
 from .errors import RecipeError
-from .metric import Constant, Field
+from .field_tables import asks_for_pitch, field_from_toml, field_to_toml
+from .metric import Constant, Described
+from .toml_values import (
+    Point,
+    check_above,
+    check_at_least,
+    check_finite,
+    check_one_of,
+    flag,
+    nearest,
+    number,
+    point,
+    show,
+    spell,
+    text,
+    texts,
+    whole,
+)
 
 INTEGRATORS = ("fire", "rk4")
+ORIENTATIONS = ("edge", "best")
+SOLVERS = ("direct", "iterate")
 KINDS = ("hole",)
 FORMATS = ("stl", "obj", "ply", "3mf", "glb")
 
@@ -31,32 +49,62 @@ NEAT = (1, 1.1, 1.2, 1.4, 1.6, 1.8, 2, 2.2, 2.5, 2.8, 3, 3.5, 4, 4.5, 5, 5.5, 6,
 
 @dataclass(frozen=True)
 class RegionChoice:
-    """Which faces of the base are the target region: exactly one of near, attribute, material and all."""
+    """Which faces of the base are the target region: exactly one of near, attribute, material and all.
 
-    near: tuple[float, float, float] | None = None
+    parts: face attributes or materials whose faces are sub-regions with a first row of their own along their
+    border (what none of them names is one more); gap: what stays free between neighbouring sub-regions
+    """
+
+    near: Point | None = None
     max_angle: float = 20.0
     attribute: str | None = None
     material: str | None = None
     all: bool = False
+    parts: tuple[str, ...] = ()
+    gap: float = 0.0
 
 
 @dataclass(frozen=True)
 class Packing:
-    """Step 1. pitch is the packing metric: the distance of neighbouring centres."""
+    """Step 1. pitch is the packing metric: the distance of neighbouring centres.
 
-    pitch: Field = Constant(3.0)
+    orientation: where the rows of the arrangement run, "edge" (along the longest straight stretch of the
+    boundary), a vector, or "best" (several directions are tried)
+    """
+
+    pitch: Described = Constant(3.0)
     edge_offset: float = 0.0
     integrator: str = "fire"
+    orientation: str | Point = "edge"
     seed: int = 0
-    iterations: int = 120
+    iterations: int = 60
     tolerance: float = 1e-3
 
 
 @dataclass(frozen=True)
-class Shaping:
-    """Step 2. diameter is the shaping metric."""
+class Seed:
+    """A feature whose diameter the designer fixes: the one nearest to the point `at`."""
 
-    diameter: Field = Constant(1.8)
+    at: Point
+    diameter: float
+
+
+@dataclass(frozen=True)
+class Shaping:
+    """Step 2.
+
+    diameter: the shaping metric, a size; as a share of the local pitch it is a Fill, in TOML the key fill
+    seeds: where there are any, only these features have a size of their own, and every other one that they
+    reach takes the average of its neighbours (see core.averaging)
+    solver: of the averages: "direct", or "iterate" as the paper does, until no diameter changes by more than
+    the share `tolerance` of it, at most `iterations` times
+    """
+
+    diameter: Described = Constant(1.8)
+    seeds: tuple[Seed, ...] = ()
+    solver: str = "direct"
+    tolerance: float = 1e-6
+    iterations: int = 10_000
 
 
 @dataclass(frozen=True)
@@ -71,10 +119,15 @@ class Feature:
 
 @dataclass(frozen=True)
 class Limits:
-    """What must remain: min_web between two features, min_margin from a feature's edge to the boundary."""
+    """What holds after shaping, whatever the fields say (see core.limits).
+
+    min_web: material between two features; min_margin: from a feature's edge to the region's boundary;
+    min_diameter: a feature that would have to be smaller is left out
+    """
 
     min_web: float = 0.0
     min_margin: float = 0.0
+    min_diameter: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -113,7 +166,8 @@ def neat(length: float) -> float:
 
 
 def default_recipe(area: float, perimeter: float = 0.0, choice: RegionChoice | None = None) -> Recipe:
-    """A good recipe for a target region of this area and with boundary loops of this length in all.
+    """A good recipe for a target region of this area and with boundary loops of this length in all, both in
+    the unit of the base; pitch and diameter are lengths in it.
 
     About 500 features, in a hexagonal arrangement where one bubble takes sqrt(3)/2 pitch^2 of the surface; a
     narrow strip, about 2 area / perimeter wide, gets at least three rows. The diameter is 0.6 of the pitch.
@@ -173,22 +227,27 @@ def recipe_from_dict(data: Mapping[str, Any], defaults: Recipe | None = None) ->
     for section in fields(Recipe):
         table = data.get(section.name, {})
         if not isinstance(table, Mapping):
-            raise RecipeError(f"{section.name} = {_show(table)} must be a table: write [{section.name}]")
+            raise RecipeError(f"{section.name} = {show(table)} must be a table: write [{section.name}]")
         values = {
             key: READERS[section.name][key](value, f"[{section.name}] {key}") for key, value in table.items()
         }
+        if "fill" in values:
+            if "diameter" in values:
+                raise RecipeError("[shaping] gives both diameter and fill: keep one of them")
+            values["diameter"] = values.pop("fill")
         result = replace(result, **{section.name: replace(getattr(result, section.name), **values)})
-    result = _proportioned(result, "pitch" in data.get("packing", {}), "diameter" in data.get("shaping", {}))
+    result = _proportioned(result, "pitch" in data.get("packing", {}), data.get("shaping", {}))
     check_choice(result.region)
     check_recipe(result)
     return result
 
 
-def _proportioned(recipe: Recipe, has_pitch: bool, has_diameter: bool) -> Recipe:
+def _proportioned(recipe: Recipe, has_pitch: bool, shaping: Mapping[str, Any]) -> Recipe:
     pitch, diameter = recipe.packing.pitch, recipe.shaping.diameter
-    if has_pitch and not has_diameter and isinstance(pitch, Constant):
-        return replace(recipe, shaping=replace(recipe.shaping, diameter=Constant(_round(FILL * pitch.value))))
-    if has_diameter and not has_pitch and isinstance(diameter, Constant):
+    if has_pitch and not {"diameter", "fill"} & set(shaping):
+        size = Constant(_round(FILL * pitch.value)) if isinstance(pitch, Constant) else Fill(Constant(FILL))
+        return replace(recipe, shaping=replace(recipe.shaping, diameter=size))
+    if "diameter" in shaping and not has_pitch and isinstance(diameter, Constant):
         return replace(recipe, packing=replace(recipe.packing, pitch=Constant(_round(diameter.value / FILL))))
     return recipe
 
@@ -205,100 +264,75 @@ def _refuse_unknown(data: Mapping[str, Any]) -> None:
             if section in home:
                 advice = f"it belongs under [{home[section]}]"
             else:
-                advice = _nearest(section, [f"[{name}]" for name in READERS], [*READERS])
-            raise RecipeError(f"Unknown table or key {_show(section)} at the top of the recipe: {advice}")
+                advice = nearest(section, READERS, [f"[{name}]" for name in READERS])
+            raise RecipeError(f"Unknown table or key {show(section)} at the top of the recipe: {advice}")
         for key in table if isinstance(table, Mapping) else ():
             if key not in READERS[section]:
-                known = [*READERS[section]]
                 elsewhere = home.get(key)
-                advice = f"it belongs under [{elsewhere}]" if elsewhere else _nearest(key, known, known)
-                raise RecipeError(f"[{section}] has no key {_show(key)}: {advice}")
-
-
-def _nearest(word: str, shown: list[str], known: list[str]) -> str:
-    match = difflib.get_close_matches(word.lower(), known, 1, cutoff=0.5)
-    return f"did you mean {shown[known.index(match[0])]}?" if match else f"known are {', '.join(shown)}"
-
-
-def _show(value: object) -> str:
-    """A value as it may stand in a message: in TOML's spelling, cut where it is long."""
-    if isinstance(value, (bool, str)):
-        text = json.dumps(value, ensure_ascii=False)
-    elif isinstance(value, Mapping):
-        text = "{...}"
-    else:
-        text = str(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+                advice = f"it belongs under [{elsewhere}]" if elsewhere else nearest(key, READERS[section])
+                raise RecipeError(f"[{section}] has no key {show(key)}: {advice}")
 
 
 # -- readers: the right type or a RecipeError that names the key ---------------------------------------------
 
 
-def _number(value: object, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise RecipeError(f"{where} = {_show(value)} must be a number")
-    if not math.isfinite(value):
-        raise RecipeError(f"{where} = {_show(value)} must be a finite number")
-    return float(value)
+def _orientation(value: object, where: str) -> str | Point:
+    return point(value, where) if isinstance(value, list) else text(value, where)
 
 
-def _whole(value: object, where: str) -> int:
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise RecipeError(f"{where} = {_show(value)} must be a whole number")
-    return value
+def _fill(value: object, where: str) -> Fill:
+    return Fill(field_from_toml(value, where))
 
 
-def _text(value: object, where: str) -> str:
-    if not isinstance(value, str) or not value:
-        raise RecipeError(f'{where} = {_show(value)} must be a name in quotes, such as "Grille"')
-    return value
+def _seeds(value: object, where: str) -> tuple[Seed, ...]:
+    if not isinstance(value, list) or not all(isinstance(entry, Mapping) for entry in value):
+        raise RecipeError(
+            f"{where} = {show(value)} must be a list of tables: [{{ at = [x, y, z], diameter = 2.5 }}, ...]"
+        )
+    return tuple(_seed(entry, f"{where}, seed {count}") for count, entry in enumerate(value, 1))
 
 
-def _flag(value: object, where: str) -> bool:
-    if not isinstance(value, bool):
-        raise RecipeError(f"{where} = {_show(value)} must be true or false")
-    return value
-
-
-def _point(value: object, where: str) -> tuple[float, float, float]:
-    if not isinstance(value, list) or len(value) != 3:
-        raise RecipeError(f"{where} = {_show(value)} must be a point, three numbers in brackets: [x, y, z]")
-    x, y, z = (_number(coordinate, where) for coordinate in value)
-    return x, y, z
-
-
-def _texts(value: object, where: str) -> tuple[str, ...]:
-    if not isinstance(value, list):
-        raise RecipeError(f'{where} = {_show(value)} must be a list of names, such as ["3mf", "glb"]')
-    return tuple(_text(item, where) for item in value)
-
-
-def field_from_toml(value: object, where: str) -> Field:
-    """The field that a recipe's value describes: a number is the same everywhere."""
-    return Constant(_number(value, where))
-
-
-def field_to_toml(value: Field) -> str:
-    """TOML's spelling of a field, such that field_from_toml gives the field again."""
-    if isinstance(value, Constant):
-        return repr(float(value.value))
-    raise TypeError(f"no TOML spelling for a field of type {type(value).__name__}")
+def _seed(table: Mapping[str, object], where: str) -> Seed:
+    readers: dict[str, Callable[[object, str], Any]] = {"at": point, "diameter": number}
+    for key in table:
+        if key not in readers:
+            raise RecipeError(f"{where} has no key {show(key)}: {nearest(key, readers)}")
+    for key in readers:
+        if key not in table:
+            raise RecipeError(f"{where} lacks {key}: give it")
+    return Seed(**{key: readers[key](entry, f"{where}: {key}") for key, entry in table.items()})
 
 
 READERS: dict[str, dict[str, Callable[[object, str], Any]]] = {
-    "region": {"near": _point, "max_angle": _number, "attribute": _text, "material": _text, "all": _flag},
+    "region": {
+        "near": point,
+        "max_angle": number,
+        "attribute": text,
+        "material": text,
+        "all": flag,
+        "parts": texts,
+        "gap": number,
+    },
     "packing": {
         "pitch": field_from_toml,
-        "edge_offset": _number,
-        "integrator": _text,
-        "seed": _whole,
-        "iterations": _whole,
-        "tolerance": _number,
+        "edge_offset": number,
+        "orientation": _orientation,
+        "integrator": text,
+        "seed": whole,
+        "iterations": whole,
+        "tolerance": number,
     },
-    "shaping": {"diameter": field_from_toml},
-    "feature": {"kind": _text, "depth": _number, "sides": _whole, "tolerance": _number},
-    "limits": {"min_web": _number, "min_margin": _number},
-    "output": {"blend": _flag, "picture": _flag, "formats": _texts},
+    "shaping": {
+        "diameter": field_from_toml,
+        "fill": _fill,
+        "seeds": _seeds,
+        "solver": text,
+        "tolerance": number,
+        "iterations": whole,
+    },
+    "feature": {"kind": text, "depth": number, "sides": whole, "tolerance": number},
+    "limits": {"min_web": number, "min_margin": number, "min_diameter": number},
+    "output": {"blend": flag, "picture": flag, "formats": texts},
 }
 
 
@@ -317,6 +351,9 @@ def check_choice(choice: RegionChoice) -> None:
         raise RecipeError(f"[region] chooses faces in {len(ways)} ways ({', '.join(ways)}): keep one of them")
     if not 0 <= choice.max_angle <= 180:
         raise RecipeError(f"[region] max_angle = {choice.max_angle:g} must be from 0 to 180 degrees")
+    check_at_least(choice.gap, 0, "[region] gap")
+    if choice.gap and not choice.parts:
+        raise RecipeError("[region] gap goes between parts: name these too, or leave gap out")
 
 
 def check_recipe(recipe: Recipe) -> None:
@@ -325,68 +362,115 @@ def check_recipe(recipe: Recipe) -> None:
     The region's choice is left to check_choice: a caller that holds the faces already needs none.
     """
     packing, feature, limits = recipe.packing, recipe.feature, recipe.limits
-    _above(packing.pitch, "[packing] pitch")
-    _above(recipe.shaping.diameter, "[shaping] diameter")
-    _one_of(packing.integrator, INTEGRATORS, "[packing] integrator")
-    _at_least(packing.seed, 0, "[packing] seed")
-    _at_least(packing.iterations, 1, "[packing] iterations")
-    _above(packing.tolerance, "[packing] tolerance")
-    _one_of(feature.kind, KINDS, "[feature] kind")
+    _check_length(packing.pitch, "[packing] pitch")
+    if asks_for_pitch(packing.pitch):
+        raise RecipeError("[packing] pitch is given as a share of itself: fill goes with diameters")
+    _check_shaping(recipe.shaping)
+    if isinstance(packing.orientation, str):
+        check_one_of(packing.orientation, ORIENTATIONS, "[packing] orientation")
+    elif not any(packing.orientation):
+        raise RecipeError("[packing] orientation = [0, 0, 0] is no direction: give a vector along the rows")
+    check_one_of(packing.integrator, INTEGRATORS, "[packing] integrator")
+    check_at_least(packing.seed, 0, "[packing] seed")
+    check_at_least(packing.iterations, 1, "[packing] iterations")
+    check_above(packing.tolerance, "[packing] tolerance")
+    check_one_of(feature.kind, KINDS, "[feature] kind")
     if feature.depth is not None:
-        _above(feature.depth, "[feature] depth")
+        check_above(feature.depth, "[feature] depth")
     if feature.sides is not None:
-        _at_least(feature.sides, 3, "[feature] sides")
+        check_at_least(feature.sides, 3, "[feature] sides")
     if feature.tolerance is not None:
-        _above(feature.tolerance, "[feature] tolerance")
-    _at_least(limits.min_web, 0, "[limits] min_web")
-    _at_least(limits.min_margin, 0, "[limits] min_margin")
+        check_above(feature.tolerance, "[feature] tolerance")
+    check_at_least(limits.min_web, 0, "[limits] min_web")
+    check_at_least(limits.min_margin, 0, "[limits] min_margin")
+    check_at_least(limits.min_diameter, 0, "[limits] min_diameter")
     for name in recipe.output.formats:
-        _one_of(name, FORMATS, "[output] formats")
+        check_one_of(name, FORMATS, "[output] formats")
     _check_room(recipe)
 
 
+def _check_length(described: Described, where: str) -> None:
+    """RecipeError for a field that makes no sense or can become 0 or less; one without bounds is judged in
+    place.
+    """
+    described.check(where)
+    low, _ = described.bounds()
+    if isinstance(described, Constant):
+        check_above(low, where)
+    elif math.isfinite(low) and low <= 0:
+        raise RecipeError(f"{where} can become {low:g}: a field of lengths must stay above 0 everywhere")
+
+
+def _check_shaping(shaping: Shaping) -> None:
+    size = shaping.diameter
+    if isinstance(size, Fill):
+        _check_length(size.share, "[shaping] fill")
+        _, most = size.share.bounds()
+        if math.isfinite(most) and most >= 1:
+            raise RecipeError(f"[shaping] fill can become {most:g}, which leaves no web: keep it below 1")
+    else:
+        _check_length(size, "[shaping] diameter")
+    for count, seed in enumerate(shaping.seeds, 1):
+        for coordinate in seed.at:
+            check_finite(coordinate, f"[shaping] seeds, seed {count}: at")
+        check_above(seed.diameter, f"[shaping] seeds, seed {count}: diameter")
+    check_one_of(shaping.solver, SOLVERS, "[shaping] solver")
+    check_above(shaping.tolerance, "[shaping] tolerance")
+    check_at_least(shaping.iterations, 1, "[shaping] iterations")
+
+
+def uniform_diameter(recipe: Recipe) -> float | None:
+    """The diameter of all features where it is one and the same; None where it depends on the place."""
+    pitch, size = recipe.packing.pitch, recipe.shaping.diameter
+    if recipe.shaping.seeds:
+        return None
+    if isinstance(size, Fill):
+        if isinstance(size.share, Constant) and isinstance(pitch, Constant):
+            return size.share.value * pitch.value
+        return None
+    return size.value if isinstance(size, Constant) else None
+
+
 def _check_room(recipe: Recipe) -> None:
-    """Features must not touch their neighbours, nor cross the boundary. Graded fields are judged in place."""
-    pitch, diameter = recipe.packing.pitch, recipe.shaping.diameter
+    """Features must not touch their neighbours, nor cross the boundary. Graded ones are limited in place."""
+    pitch, diameter = recipe.packing.pitch, uniform_diameter(recipe)
     offset = recipe.packing.edge_offset
-    if not math.isfinite(offset):
-        raise RecipeError(f"[packing] edge_offset = {offset} must be a finite number")
-    if not (isinstance(pitch, Constant) and isinstance(diameter, Constant)):
+    check_finite(offset, "[packing] edge_offset")
+    if diameter is None:
         return
-    if diameter.value >= pitch.value:
+    if recipe.limits.min_diameter > diameter:
         raise RecipeError(
-            f"[shaping] diameter = {diameter.value:g} leaves no web at pitch {pitch.value:g}: "
-            "make the diameter smaller than the pitch"
+            "[limits] min_diameter = {least} is more than the diameter {diameter}, which leaves no feature: "
+            "make it smaller",
+            least=recipe.limits.min_diameter,
+            diameter=diameter,
         )
-    margin = (pitch.value - diameter.value) / 2 + offset
+    if not isinstance(pitch, Constant):
+        return
+    if diameter >= pitch.value:
+        raise RecipeError(
+            "[shaping] diameter = {diameter} leaves no web at pitch {pitch}: "
+            "make the diameter smaller than the pitch",
+            diameter=diameter,
+            pitch=pitch.value,
+        )
+    margin = (pitch.value - diameter) / 2 + offset
     if margin < 0:
         raise RecipeError(
-            f"[packing] edge_offset = {offset:g} would push features {-margin:g} over the boundary: "
-            f"give at least {-(pitch.value - diameter.value) / 2:g}"
+            "[packing] edge_offset = {offset} would push features {over} over the boundary: "
+            "give at least {least}",
+            offset=offset,
+            over=-margin,
+            least=(diameter - pitch.value) / 2,
         )
-    web = pitch.value - diameter.value
+    web = pitch.value - diameter
     if recipe.limits.min_web > web:
         raise RecipeError(
-            f"[limits] min_web = {recipe.limits.min_web:g} is more than pitch - diameter = {web:g}: "
-            f"make the diameter at most {pitch.value - recipe.limits.min_web:g}"
-        )
-
-
-def _above(value: float | Field, where: str) -> None:
-    number = value.value if isinstance(value, Constant) else value
-    if isinstance(number, (int, float)) and not (math.isfinite(number) and number > 0):
-        raise RecipeError(f"{where} = {number:g} must be a number above 0")
-
-
-def _at_least(value: float, low: float, where: str) -> None:
-    if not (math.isfinite(value) and value >= low):
-        raise RecipeError(f"{where} = {value:g} must be at least {low:g}")
-
-
-def _one_of(value: str, known: tuple[str, ...], where: str) -> None:
-    if value not in known:
-        raise RecipeError(
-            f"{where} = {_show(value)} is not known: {_nearest(value, [_show(k) for k in known], [*known])}"
+            "[limits] min_web = {limit} is more than pitch - diameter = {web}: "
+            "make the diameter at most {most}",
+            limit=recipe.limits.min_web,
+            web=web,
+            most=pitch.value - recipe.limits.min_web,
         )
 
 
@@ -400,7 +484,7 @@ def recipe_to_toml(recipe: Recipe) -> str:
         table = getattr(recipe, section.name)
         lines += [f"[{section.name}]"]
         lines += [
-            f"{entry.name} = {_spell(getattr(table, entry.name))}"
+            _line(entry.name, getattr(table, entry.name))
             for entry in fields(table)
             if getattr(table, entry.name) is not None
         ]
@@ -408,14 +492,12 @@ def recipe_to_toml(recipe: Recipe) -> str:
     return "\n".join(lines)
 
 
-def _spell(value: object) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, (int, float)):
-        return repr(value)
-    if isinstance(value, str):
-        # TOML's basic strings are JSON's, but for DEL, which TOML wants escaped
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    if isinstance(value, tuple):
-        return "[" + ", ".join(_spell(item) for item in value) + "]"
-    return field_to_toml(value)  # type: ignore[arg-type]
+def _line(key: str, value: object) -> str:
+    if key == "diameter" and isinstance(value, Fill):
+        return f"fill = {field_to_toml(value.share)}"
+    if isinstance(value, Described):
+        return f"{key} = {field_to_toml(value)}"
+    if key == "seeds":
+        assert isinstance(value, tuple)
+        return f"seeds = {spell([{'at': seed.at, 'diameter': seed.diameter} for seed in value])}"
+    return f"{key} = {spell(value)}"

@@ -15,6 +15,8 @@ from .mesh import Bools, Floats, Ints, Mesh
 # A triangle is flat when its height is below this share of its longest edge: walking over it would divide by
 # zero.
 FLAT = 1e-12
+# Faces that turn by no more than this, in radians, lie in one plane: as much as single precision costs.
+LEVEL = 1e-4
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,8 @@ class Region:
     sheet: (R,) label of the connected part a triangle belongs to
     loops: boundary loops as rows of base vertices, the region on the left of each edge
     rim: (S, 2) every boundary edge as (region row, opposite corner), in the order of the loops
+    reserve: (S,) what the first row keeps from each of these beyond its radius: half the gap between
+    sub-regions on the borders that they share, else 0
     """
 
     base: Mesh
@@ -37,6 +41,7 @@ class Region:
     sheet: Ints
     loops: tuple[Ints, ...]
     rim: Ints
+    reserve: Floats
 
     @cached_property
     def corners(self) -> Floats:
@@ -72,6 +77,12 @@ class Region:
         return bool(self.sheet.max() == 0 and length > 0 and (self.normals @ mean).min() > 0.7 * length)
 
     @cached_property
+    def flat(self) -> bool:
+        """Whether all triangles face the same way: each part of the region lies in a plane."""
+        away = self.normals - self.normals[0]
+        return bool(np.einsum("rc,rc->r", away, away).max() < LEVEL**2)
+
+    @cached_property
     def boundary_segments(self) -> Floats:
         """Start and end of every boundary edge, the region on the left, (S, 2, 3)."""
         if not len(self.rim):
@@ -80,9 +91,18 @@ class Region:
         ends = np.stack([(corner + 1) % 3, (corner + 2) % 3], axis=1)
         return self.corners[row[:, None], ends]
 
+    @cached_property
+    def perimeter(self) -> float:
+        """Length of all boundary loops together."""
+        start, end = self.boundary_segments.swapaxes(0, 1)
+        return float(np.linalg.norm(end - start, axis=1).sum())
 
-def make_region(base: Mesh, selected: Bools) -> Region:
+
+def make_region(base: Mesh, selected: Bools, parts: Ints | None = None, gap: float = 0.0) -> Region:
     """Region made of the `selected` (T,) triangles of `base`.
+
+    parts: (T,) numbers of sub-regions; each is bounded by its own border, and where two meet the features
+    of both stay half the `gap` away from it; None: all is one
 
     Edges that more than two region triangles share, or that two of them run along in the same direction,
     count as boundary: bubbles do not cross them.
@@ -96,8 +116,14 @@ def make_region(base: Mesh, selected: Bools) -> Region:
     _check_geometry(welded, triangles)
     rows = welded.triangles[triangles]
     neighbours, opposite = _adjacency(rows)
+    shared = np.zeros_like(neighbours, dtype=bool)
+    if parts is not None:
+        own = parts[triangles]
+        shared = (neighbours >= 0) & (own[neighbours] != own[:, None])
+        neighbours, opposite = np.where(shared, -1, neighbours), np.where(shared, -1, opposite)
     loops, rim = _boundary_loops(rows, neighbours, opposite)
-    return Region(welded, triangles, neighbours, opposite, _sheets(neighbours), loops, rim)
+    reserve = np.where(shared[rim[:, 0], rim[:, 1]], gap / 2, 0.0)
+    return Region(welded, triangles, neighbours, opposite, _sheets(neighbours), loops, rim, reserve)
 
 
 def weld(mesh: Mesh) -> Mesh:

@@ -1,28 +1,77 @@
-"""Step 2: the size of the feature in every bubble, from the shaping metric."""
+"""Step 2: the size of the feature in every bubble, from the shaping metric, within the limits."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from .errors import RecipeError
+from .averaging import averaged
+from .errors import FieldError, RecipeError
+from .limits import limited
+from .links import Links, links_of
 from .mesh import Floats
-from .metric import Places
-from .recipe import Shaping
+from .metric import Described, Field
+from .pattern import Pattern, all_bubbles
+from .recipe import Recipe, Shaping
+from .region import Region
+from .surroundings import Surroundings
 
 
-def diameters(shaping: Shaping, places: Places, pitch: Floats) -> Floats:
-    """Diameters (n,) of the features at `places`, whose bubbles have the local `pitch` (n,).
-
-    Raises RecipeError where a diameter is no positive length or a feature would reach out of its bubble.
+def bound(described: Described, surroundings: Surroundings, where: str) -> Field:
+    """The field in its surroundings. FieldError, which names the recipe's key by `where`, for what they
+    lack.
     """
-    diameter = shaping.diameter(places)
-    if not (np.isfinite(diameter).all() and diameter.min(initial=np.inf) > 0):
-        raise RecipeError("The diameter must be a positive length everywhere in the target region: raise it.")
-    over = diameter >= pitch
-    if over.any():
-        at = int(np.argmax(diameter / pitch))
+    try:
+        return described.bind(surroundings)
+    except FieldError as error:
+        raise FieldError(f"{where}: {error}") from None
+
+
+def shaped(
+    bubbles: Pattern, links: Links, region: Region, recipe: Recipe, surroundings: Surroundings
+) -> Pattern:
+    """The bubbles with a feature in each, as the recipe's shaping and limits want it; what their diameters
+    were before does not matter.
+
+    Raises RecipeError where a diameter is no positive length, a seed does not fit or no feature is left,
+    FieldError where the surroundings lack something.
+    """
+    wished, notes = diameters(recipe.shaping, bubbles, links, replace(surroundings, region=region))
+    pattern = limited(replace(bubbles, diameter=wished, notes=notes), region, recipe.limits)
+    if len(bubbles) and not len(pattern):
         raise RecipeError(
-            f"The diameter {diameter[at]:.4g} is not smaller than the pitch {pitch[at]:.4g}: "
-            "features would touch; use a smaller diameter or a larger pitch."
+            "No feature is left: diameters up to {widest} do not go with [limits] min_web = {web}, "
+            "min_margin = {margin} and min_diameter = {least}; make one of these smaller or the pitch larger",
+            widest=float(wished.max()),
+            web=recipe.limits.min_web,
+            margin=recipe.limits.min_margin,
+            least=recipe.limits.min_diameter,
         )
-    return diameter
+    return pattern
+
+
+def reshaped(pattern: Pattern, region: Region, recipe: Recipe, surroundings: Surroundings) -> Pattern:
+    """The pattern with its features shaped anew on the bubbles that are there; see shaped."""
+    bubbles = all_bubbles(pattern)
+    return shaped(bubbles, links_of(bubbles, region), region, recipe, surroundings)
+
+
+def diameters(
+    shaping: Shaping, bubbles: Pattern, links: Links, surroundings: Surroundings
+) -> tuple[Floats, tuple[str, ...]]:
+    """Diameters (n,) that the shaping metric asks for, and what a designer should know of them."""
+    pitch = bubbles.pitch
+    here = replace(surroundings, pitch=lambda places: pitch)
+    field = bound(shaping.diameter, here, "[shaping] diameter")
+    wished = field(bubbles.places)
+    if not (np.isfinite(wished).all() and wished.min(initial=np.inf) > 0):
+        raise RecipeError("The diameter must be a positive length everywhere in the target region: raise it.")
+    if not shaping.seeds or not len(bubbles):
+        return wished, ()
+    wished, reached = averaged(shaping, wished, links, bubbles.position, pitch)
+    alone = int((~reached).sum())
+    if not alone:
+        return wished, ()
+    features = "One feature is" if alone == 1 else f"{alone:,} features are"
+    return wished, (f"{features} linked to no seed and as large as without seeds.",)

@@ -11,6 +11,7 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from .boxtree import build_tree, meeting_cylinders
+from .errors import RegionError
 from .mesh import Bools, Floats, Ints, Mesh
 from .region import weld
 
@@ -64,6 +65,17 @@ def lies_on_both_sides(base: Mesh, selected: Bools) -> bool:
     area = np.linalg.norm(base.area_vectors[rows], axis=1)
     both = area[_looks_through(base, selected)[0]].sum()
     return bool(both > area[_sample(len(rows))].sum() / 2)
+
+
+def check_one_side(base: Mesh, selected: Bools) -> None:
+    """Raise RegionError where through-holes in the `selected` triangles of `base` (T,) would start from both
+    sides of one wall.
+    """
+    if lies_on_both_sides(base, selected):
+        raise RegionError(
+            "The target region is on both sides of the wall, so that holes through it would run into one "
+            "another: keep one side of it, or make the holes blind"
+        )
 
 
 def _looks_through(base: Mesh, selected: Bools) -> tuple[Ints, Ints, Floats]:

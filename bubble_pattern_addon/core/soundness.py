@@ -64,8 +64,8 @@ def sound_base(base: Mesh) -> SoundBase:
     return _known[key]
 
 
-def forget() -> None:
-    """Let the next base be looked through whatever came before, as by a designer's first try on it."""
+def forget_base() -> None:
+    """Let the next base be looked through anew, for whoever measures what that costs."""
     _known.clear()
 
 

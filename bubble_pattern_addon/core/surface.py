@@ -9,10 +9,12 @@ they start in.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from .mesh import Bools, Floats, Ints
 from .region import Region
@@ -22,6 +24,11 @@ Complex = NDArray[np.complex128]
 # How far outside a triangle, as a share of its height, still counts as inside: far below any length that
 # matters.
 INSIDE = -1e-12
+# A search that has crossed so many triangles goes in circles.
+MOST_PASSES = 400
+# One that has crossed LONG triangles asks the nearest of about so many SIGNPOSTS.
+LONG = 8
+SIGNPOSTS = 1500
 # Faces that turn by more than this meet in an edge, not in a smooth surface.
 CREASE = np.radians(35.0)
 
@@ -45,6 +52,40 @@ class Charts:
     gradients: Complex
     turns: Complex
 
+    @cached_property
+    def plane(self) -> Plane:
+        """How the frames of a flat region lie in its one plane, whose axes are those of the first."""
+        origin = in_plane(self, self.region.corners[:, 0])
+        turn = np.einsum("rc,ac->ra", self.axes[:, 0], self.axes[0]).view(np.complex128)[:, 0]
+        turn /= np.abs(turn)
+        gradients = self.gradients * turn[:, None]
+        return Plane(origin, turn, gradients.real.copy(), gradients.imag.copy())
+
+    @cached_property
+    def signposts(self) -> tuple[cKDTree, Ints]:
+        """Places all over a flat region, (x, y, sheet) in its plane, and the triangles they are in."""
+        corners = self.region.corners
+        sides = np.linalg.norm(np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1), axis=2)
+        spacing = np.sqrt(self.region.area / SIGNPOSTS)
+        number = np.clip(np.ceil(sides.max(axis=1) / spacing), 1, SIGNPOSTS // 10).astype(np.int64)
+        owner = np.repeat(np.arange(len(corners)), number)
+        share = (np.arange(len(owner)) - np.repeat(np.cumsum(number) - number, number) + 0.5) / number[owner]
+        # Along the line from the middle of the shortest side to the corner opposite to it.
+        bary = np.repeat((1 - share)[:, None] / 2, 3, axis=1)
+        bary[np.arange(len(owner)), sides.argmin(axis=1)[owner]] = share
+        return cKDTree(_posted(self, in_plane(self, positions(self, Spots(owner, bary))), owner)), owner
+
+
+class Plane(NamedTuple):
+    """Triangles of a flat region in complex coordinates of its plane: origin (R,) their first corners, turn
+    (R,) their frames' directions; across, along (R, 3) what the barycentric coordinates grow by per length.
+    """
+
+    origin: Complex
+    turn: Complex
+    across: Floats
+    along: Floats
+
 
 class Spots(NamedTuple):
     """Places: region row (n,) and barycentric coordinates (n, 3)."""
@@ -53,7 +94,7 @@ class Spots(NamedTuple):
     barycentric: Floats
 
     def take(self, which: Ints | Bools) -> Spots:
-        """The places `which`."""
+        """The places `which`: rows (m,) or a mask (n,)."""
         return Spots(self.row[which], self.barycentric[which])
 
 
@@ -89,12 +130,12 @@ def make_charts(region: Region) -> Charts:
 
 
 def positions(charts: Charts, spots: Spots) -> Floats:
-    """Points in space, (n, 3)."""
+    """The places `spots` as points in space, (n, 3)."""
     return np.einsum("nk,nkc->nc", spots.barycentric, charts.region.corners[spots.row])
 
 
 def to_frame(charts: Charts, row: Ints, vectors: Floats) -> Complex:
-    """Vectors (n, 3) projected onto the planes of the triangles `row` (n,)."""
+    """Vectors (n, 3) projected onto the planes of the triangles `row` (n,), as steps there, (n,)."""
     return np.einsum("nac,nc->na", charts.axes[row], vectors).view(np.complex128)[:, 0]
 
 
@@ -105,11 +146,18 @@ def to_space(charts: Charts, row: Ints, steps: Complex) -> Floats:
 
 
 def walk(charts: Charts, start: Spots, steps: Complex, carried: Complex | None = None) -> Walk:
-    """Walk straight from `start` by `steps` (n,), all at once: every pass takes everyone over at most one
-    edge.
+    """Walk straight from `start` by `steps` (n,), all at once.
 
-    Directions `carried` (n,) are transported along. A walk ends where it meets the boundary.
+    Directions `carried` (n,) are transported along. A walk ends where it meets the boundary; in a plane,
+    where only the end matters, it may go round what lies between.
     """
+    if charts.region.flat:
+        return _walk_in_plane(charts, start, steps, steps if carried is None else carried)
+    return _walk_straight(charts, start, steps, carried)
+
+
+def _walk_straight(charts: Charts, start: Spots, steps: Complex, carried: Complex | None) -> Walk:
+    """Walk over one edge after the other: every pass takes everyone over at most one."""
     row = start.row.copy()
     carried = steps.astype(np.complex128) if carried is None else carried.astype(np.complex128)
     rate = _rates(charts, row, steps)
@@ -144,6 +192,72 @@ def walk(charts: Charts, start: Spots, steps: Complex, carried: Complex | None =
         out, at, here, step = out[outside], at[outside], here[outside], step[outside]
         turned, rate = turned[outside], rate[outside]
     return Walk(Spots(row, bary), carried, left)
+
+
+def _walk_in_plane(charts: Charts, start: Spots, steps: Complex, carried: Complex) -> Walk:
+    """Search for where the steps end; what is not found there goes straight and ends at the boundary."""
+    frames = charts.plane
+    ends = in_plane(charts, positions(charts, start)) + product(steps, frames.turn[start.row])
+    arrived, there = search(charts, start.row, ends)
+    carried = product(carried, frames.turn[start.row] * np.conj(frames.turn[arrived.row]))
+    left = np.zeros(len(steps), dtype=np.complex128)
+    lost = np.flatnonzero(~there)
+    if len(lost):
+        straight = _walk_straight(charts, start.take(lost), steps[lost], carried[lost])
+        arrived.row[lost], arrived.barycentric[lost] = straight.arrived
+        carried[lost], left[lost] = straight.carried, straight.left
+    return Walk(arrived, carried, left)
+
+
+def in_plane(charts: Charts, points: Floats) -> Complex:
+    """Points (n, 3) of a flat region as complex numbers in its plane, (n,)."""
+    return np.einsum("nc,ac->na", points, charts.axes[0]).view(np.complex128)[:, 0]
+
+
+def search(charts: Charts, row: Ints, ends: Complex) -> tuple[Spots, Bools]:
+    """Places of points `ends` (n,) in the plane of a flat region, and which of them (n,) were found.
+
+    Every search starts in the triangle `row` and steps over the edge that the point lies farthest beyond: it
+    costs a fraction of a walk. It gives up where only the boundary is in that direction. Those that take
+    long, as where narrow triangles fan out, start anew from the nearest signpost.
+    """
+    frames, neighbours = charts.plane, charts.region.neighbours
+    row = row.copy()
+    bary = np.zeros((len(row), 3))
+    found = np.zeros(len(row), dtype=bool)
+    out, at = np.arange(len(row)), row
+    for number in range(MOST_PASSES):
+        if number == LONG:
+            at = nearest_signpost(charts, ends, at)
+        offset = (ends - frames.origin[at])[:, None]
+        here = offset.real * frames.across[at] + offset.imag * frames.along[at]
+        here[:, 0] += 1
+        inside = ~_outside(here)
+        ended = out[inside]
+        row[ended], bary[ended], found[ended] = at[inside], here[inside], True
+        here, beyond = here[~inside], neighbours[at[~inside]]
+        out, ends = out[~inside], ends[~inside]
+        if not len(out):
+            break
+        here[beyond < 0] = np.inf
+        corner, pick = here.argmin(axis=1), np.arange(len(out))
+        going = here[pick, corner] < 0
+        out, ends, at = out[going], ends[going], beyond[pick, corner][going]
+    return Spots(row, bary), found
+
+
+def nearest_signpost(charts: Charts, ends: Complex, row: Ints) -> Ints:
+    """Triangle (n,) of the signpost nearest to each of the points `ends`, on the sheet of the triangles `row`
+    (n,) or (1,).
+    """
+    tree, owner = charts.signposts
+    return owner[tree.query(_posted(charts, ends, row))[1]]
+
+
+def _posted(charts: Charts, ends: Complex, row: Ints) -> Floats:
+    """Points of the plane with the sheet of their triangles as a third coordinate that keeps sheets apart."""
+    apart = 10 * charts.region.extent * charts.region.sheet[row]
+    return np.stack(np.broadcast_arrays(ends.real, ends.imag, apart), axis=1)
 
 
 def product(a: Complex, b: Complex) -> Complex:
@@ -196,25 +310,28 @@ def smooth_normals(region: Region, spots: Spots) -> Floats:
     Interpolated between corner normals, each the mean (weighted by area) of the triangles round that vertex
     that turn by less than CREASE from this one: a tessellated curve is smooth, an edge stays an edge.
     """
-    corner_normals = _corner_normals(region)
-    normal = np.einsum("nk,nkc->nc", spots.barycentric, corner_normals[spots.row])
+    if region.flat:
+        return region.normals[spots.row]
+    rows, of_spot = np.unique(spots.row, return_inverse=True)
+    corner_normals = _corner_normals(region, rows)
+    normal = np.einsum("nk,nkc->nc", spots.barycentric, corner_normals[of_spot.reshape(-1)])
     return normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
 
-def _corner_normals(region: Region) -> Floats:
+def _corner_normals(region: Region, rows: Ints) -> Floats:
+    """Unit normals (r, 3, 3) at the corners of the triangles `rows` (r,)."""
     vertices = region.base.triangles[region.triangles].ravel()
-    vertex, corner_of = np.unique(vertices, return_inverse=True)
-    corner_of = corner_of.reshape(-1)
-    order = np.argsort(corner_of, kind="stable")
-    count = np.bincount(corner_of, minlength=len(vertex))
+    order = np.argsort(vertices, kind="stable")
+    count = np.bincount(vertices)
     start = np.cumsum(count) - count
     # Every corner meets all corners at its vertex, itself among them.
-    own = np.repeat(np.arange(len(vertices)), count[corner_of])
-    turn = np.arange(len(own)) - np.repeat(np.cumsum(count[corner_of]) - count[corner_of], count[corner_of])
-    other = order[start[corner_of[own]] + turn]
+    asked = (3 * rows[:, None] + np.arange(3)).ravel()
+    number = count[vertices[asked]]
+    own = np.repeat(np.arange(len(asked)), number)
+    turn = np.arange(len(own)) - np.repeat(np.cumsum(number) - number, number)
+    other = order[start[vertices[asked[own]]] + turn] // 3
     normals = region.normals
-    smooth = np.einsum("mc,mc->m", normals[own // 3], normals[other // 3]) > np.cos(CREASE)
-    own, other = own[smooth], other[smooth]
-    weighted = region.area_vectors[other // 3]
-    total = np.stack([np.bincount(own, axis, len(vertices)) for axis in weighted.T], axis=1)
+    smooth = np.einsum("mc,mc->m", normals[asked[own] // 3], normals[other]) > np.cos(CREASE)
+    own, weighted = own[smooth], region.area_vectors[other[smooth]]
+    total = np.stack([np.bincount(own, axis, len(asked)) for axis in weighted.T], axis=1)
     return (total / np.linalg.norm(total, axis=1, keepdims=True)).reshape(-1, 3, 3)

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import posixpath
 import zipfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 from xml.etree import ElementTree
 from xml.sax.saxutils import quoteattr
@@ -25,10 +27,14 @@ START = "3D/3dmodel.model"
 
 
 class Piece(NamedTuple):
-    """Part of a base file: a mesh and, per triangle, the name of its material ("" for none), (T,) str."""
+    """Part of a base file: a mesh and, per triangle, the name of its material ("" for none), (T,) str; what
+    is painted on it by name, (T,), (T, 3) or (T, 3, channels), and UV maps, (T, 3, 2).
+    """
 
     mesh: Mesh
     material: np.ndarray[tuple[int], np.dtype[np.str_]]
+    values: Mapping[str, Floats] = MappingProxyType({})
+    uv_maps: Mapping[str, Floats] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -50,6 +56,7 @@ def read_3mf(path: Path) -> list[Piece]:
         models: dict[str, _Model] = {}
 
         def model(name: str) -> _Model:
+            """The model file of this name in the archive, read once. KeyError where there is none."""
             key = posixpath.normpath(name.lstrip("/")).lower()
             if key not in models:
                 models[key] = _parse(archive.read(names[key]))
@@ -119,7 +126,7 @@ def _material_name(materials: dict[str, list[str]], group: str, index: str) -> s
 
 
 def write_3mf(path: Path, mesh: Mesh, name: str = "part") -> None:
-    """One mesh as a 3MF file in millimetres."""
+    """One mesh as a 3MF file in millimetres, whatever its own unit. OSError where it can't be written."""
     vertices = "".join(f'<vertex x="{x:.9g}" y="{y:.9g}" z="{z:.9g}"/>' for x, y, z in mesh.vertices.tolist())
     triangles = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in mesh.triangles.tolist())
     declaration = '<?xml version="1.0" encoding="UTF-8"?>\n'

@@ -161,6 +161,7 @@ class Spans:
     axis: Floats
 
     def only(self, chosen: Bools) -> Spans:
+        """Those of the spans that are `chosen`, (m,)."""
         return Spans(
             self.low[chosen], self.high[chosen], self.inside[chosen], self.facing[chosen], self.axis[chosen]
         )
@@ -179,6 +180,7 @@ def disc_spans(local: Floats, radius: Floats) -> Spans:
     low, high = np.full(len(local), np.inf), np.full(len(local), -np.inf)
 
     def take(heights: Floats, valid: Bools) -> None:
+        """Widen each span to those of its `heights` that are `valid`, both (k, m)."""
         np.minimum(low, np.where(valid, heights, np.inf).min(axis=0), out=low)
         np.maximum(high, np.where(valid, heights, -np.inf).max(axis=0), out=high)
 
@@ -236,16 +238,19 @@ class _Sheets:
     slack: Floats
 
     def lowest(self, chosen: Bools, heights: Floats) -> Floats:
+        """Least of the `heights`, (m,), of each feature's `chosen` spans, (m,): (n,), inf for none."""
         found = np.full(len(self.slack), np.inf)
         np.minimum.at(found, self.owner[chosen], heights[chosen])
         return found
 
     def highest(self, chosen: Bools, heights: Floats) -> Floats:
+        """Largest of the `heights`, (m,), of each feature's `chosen` spans, (m,): (n,), -inf for none."""
         found = np.full(len(self.slack), -np.inf)
         np.maximum.at(found, self.owner[chosen], heights[chosen])
         return found
 
     def any(self, chosen: Bools) -> Bools:
+        """Which features have a span that is `chosen`, (m,): (n,)."""
         return np.bincount(self.owner[chosen], minlength=len(self.slack)) > 0
 
     def grow(self, chosen: Bools, seed: Floats) -> tuple[Floats, Floats]:

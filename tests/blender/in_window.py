@@ -6,10 +6,14 @@ import json
 import sys
 import traceback
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import bpy
-import numpy as np
+
+sys.path.append(str(Path(__file__).parent))
+
+from parts import euler, is_closed, sheet
 
 bpy.context.preferences.view.show_splash = False
 picture, answer = sys.argv[sys.argv.index("--") + 1 :]
@@ -20,27 +24,34 @@ def drawn(_panel: bpy.types.Panel, _context: bpy.types.Context) -> None:
     found["drawn"] += 1
 
 
-def window() -> tuple[bpy.types.Window, bpy.types.Area]:
-    first = bpy.context.window_manager.windows[0]
-    return first, next(area for area in first.screen.areas if area.type == 'VIEW_3D')
+def view() -> bpy.types.Area:
+    """The 3D View of the only window."""
+    (window,) = bpy.context.window_manager.windows
+    return next(area for area in window.screen.areas if area.type == 'VIEW_3D')
+
+
+def region(kind: str) -> bpy.types.Region:
+    """A region of the 3D View: its sidebar, UI, or what it is round, WINDOW."""
+    return next(region for region in view().regions if region.type == kind)
+
+
+def inside(kind: str) -> AbstractContextManager[None]:
+    """The context of a region of the 3D View, as when the mouse is there."""
+    (window,) = bpy.context.window_manager.windows
+    return bpy.context.temp_override(window=window, area=view(), region=region(kind))
 
 
 def pressed(name: str) -> set[str]:
     """Press a button of the sidebar, as its click does."""
-    main, area = window()
-    region = next(region for region in area.regions if region.type == 'UI')
-    with bpy.context.temp_override(window=main, area=area, region=region):
+    with inside('UI'):
         return getattr(bpy.ops.bubble_pattern, name)('INVOKE_DEFAULT')
 
 
 def dome() -> bpy.types.Object:
-    """A smooth, gently domed plate."""
+    """A smooth, gently domed plate with a target region marked on its front."""
     for old in list(bpy.data.objects):
         bpy.data.objects.remove(old)
-    bpy.ops.mesh.primitive_grid_add(size=0.2, x_subdivisions=40, y_subdivisions=40)
-    base = bpy.context.object
-    for vertex in base.data.vertices:
-        vertex.co.z = 0.02 * np.cos(vertex.co.x * 10) * np.cos(vertex.co.y * 10)
+    base = sheet(cells=40)
     base.data.shade_smooth()
     base.modifiers.new("Wall", 'SOLIDIFY').thickness = 0.003
     bpy.ops.object.modifier_apply(modifier="Wall")
@@ -51,22 +62,21 @@ def dome() -> bpy.types.Object:
 
 
 def looked_at(base: bpy.types.Object) -> None:
-    """Turn the view to the base, with our tab of the sidebar open."""
-    main, area = window()
-    area.spaces.active.show_region_ui = True
+    """Turn the view to the base, with the sidebar open."""
+    view().spaces.active.show_region_ui = True
     bpy.context.scene.unit_settings.length_unit = 'MILLIMETERS'
-    region = next(region for region in area.regions if region.type == 'WINDOW')
-    with bpy.context.temp_override(window=main, area=area, region=region):
+    with inside('WINDOW'):
         bpy.context.view_layer.objects.active = base
         base.select_set(True)
         bpy.ops.view3d.view_selected()
 
 
-def tab() -> None:
-    _main, area = window()
-    region = next(region for region in area.regions if region.type == 'UI')
-    region.active_panel_category = "Bubble Pattern"
-    area.tag_redraw()
+def tab() -> Iterator[float]:
+    """Turn the sidebar to our tab, and give Blender the time to draw before and after."""
+    yield 0.5
+    region('UI').active_panel_category = "Bubble Pattern"
+    view().tag_redraw()
+    yield 0.5
 
 
 def until(condition: object, seconds: float = 60.0) -> Iterator[float]:
@@ -83,9 +93,7 @@ def story() -> Iterator[float]:
     base = dome()
     looked_at(base)
     bpy.types.BUBBLE_PATTERN_PT_main.append(drawn)
-    yield 0.5
-    tab()
-    yield 0.5
+    yield from tab()
 
     pressed("add")
 
@@ -95,16 +103,14 @@ def story() -> Iterator[float]:
     yield from until(pattern_there)
     pattern = bpy.data.objects[base.name + " Pattern"]
     found["features"] = pattern.bubble_pattern.count
-    yield 0.5
-    tab()
-    yield 0.5
+    yield from tab()
 
     fine = base.modifiers.new("Fine", 'SUBSURF')
     fine.levels = 2
     found["long apply"] = sorted(pressed("apply"))
-    main, _area = window()
-    main.event_simulate(type='ESC', value='PRESS')
-    main.event_simulate(type='ESC', value='RELEASE')
+    (window,) = bpy.context.window_manager.windows
+    for value in ('PRESS', 'RELEASE'):
+        window.event_simulate(type='ESC', value=value)
     yield 3.0
     found["objects after Esc"] = sorted(obj.name for obj in bpy.data.objects)
     found["base after Esc"] = base.visible_get()
@@ -118,16 +124,12 @@ def story() -> Iterator[float]:
 
     yield from until(part_there)
     part = bpy.data.objects[base.name + " Part"]
-    mesh = part.data
-    found["euler"] = len(mesh.vertices) - len(mesh.edges) + len(mesh.polygons)
-    edges = np.empty(len(mesh.loops), dtype=np.int32)
-    mesh.attributes[".corner_edge"].data.foreach_get("value", edges)
-    found["closed"] = bool((np.bincount(edges) == 2).all())
+    found["euler"] = euler(part.data)
+    found["closed"] = is_closed(part.data)
     found["holes"] = pattern.bubble_pattern.count
     found["verdict"] = pattern.bubble_pattern.verdict
+    yield from tab()
     yield 0.5
-    tab()
-    yield 1.0
 
 
 def finish() -> None:

@@ -10,8 +10,6 @@ import numpy as np
 from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 
-from bubble_pattern_addon.blender.properties import pattern_of
-
 
 def plate(size: float = 0.1, thickness: float = 0.01, name: str = "Plate") -> bpy.types.Object:
     """A flat plate of six quads, its top at z = thickness / 2."""
@@ -23,15 +21,16 @@ def plate(size: float = 0.1, thickness: float = 0.01, name: str = "Plate") -> bp
     return obj
 
 
+def height(x: float, y: float, size: float) -> float:
+    """Of the surfaces curved both ways, above the plane."""
+    return 0.1 * size * np.cos(x / size * 2) * np.cos(y / size * 2)
+
+
 def panel(size: float = 0.2, cells: int = 24, thickness: float = 0.004) -> bpy.types.Object:
     """A smooth panel curved both ways, of quads, with sharp outer edges; its top has the material Front."""
-
-    def height(x, y):
-        return 0.1 * size * np.cos(x / size * 2) * np.cos(y / size * 2)
-
     line = np.linspace(-size / 2, size / 2, cells + 1)
     x, y = np.meshgrid(line, line, indexing='ij')
-    top = np.stack([x, y, height(x, y)], axis=2).reshape(-1, 3)
+    top = np.stack([x, y, height(x, y, size)], axis=2).reshape(-1, 3)
     bottom = top - [0, 0, thickness]
     at = np.arange((cells + 1) ** 2).reshape(cells + 1, cells + 1)
     quads = np.stack([at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]], axis=2).reshape(-1, 4)
@@ -61,7 +60,7 @@ def sheet(size: float = 0.2, cells: int = 24) -> bpy.types.Object:
     bpy.ops.mesh.primitive_grid_add(size=size, x_subdivisions=cells, y_subdivisions=cells)
     obj = bpy.context.object
     for vertex in obj.data.vertices:
-        vertex.co.z = 0.1 * size * np.cos(vertex.co.x / size * 2) * np.cos(vertex.co.y / size * 2)
+        vertex.co.z = height(vertex.co.x, vertex.co.y, size)
     return obj
 
 
@@ -96,6 +95,8 @@ def add_on_top(obj: bpy.types.Object) -> bpy.types.Object:
     select_faces(obj, on_top)
     assert bpy.ops.bubble_pattern.add() == {'FINISHED'}
     assert bpy.context.object == obj
+    from bubble_pattern_addon.blender.properties import pattern_of  # an installed extension has another name
+
     return pattern_of(obj)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -51,6 +52,60 @@ def test_a_good_pattern_without_typing_a_number() -> None:
     assert settings.margin > 0
     assert 0.2 < settings.open_area < 0.5
     assert settings.six > 0.9
+
+
+def test_add_takes_pitch_and_diameter_and_lets_the_other_follow() -> None:
+    base = plate()
+    bpy.ops.bubble_pattern.add(pitch=0.006)
+    settings = pattern_of(base).bubble_pattern
+    assert (settings.pitch, settings.diameter) == pytest.approx((0.006, 0.0036))
+    bpy.ops.bubble_pattern.remove()
+    bpy.ops.bubble_pattern.add(diameter=0.003)
+    settings = pattern_of(base).bubble_pattern
+    assert (settings.pitch, settings.diameter) == pytest.approx((0.005, 0.003))
+    bpy.ops.bubble_pattern.remove()
+    bpy.ops.bubble_pattern.add(pitch=0.006, diameter=0.002)
+    settings = pattern_of(base).bubble_pattern
+    assert (settings.pitch, settings.diameter) == pytest.approx((0.006, 0.002))
+    bpy.ops.bubble_pattern.remove()
+    with pytest.raises(RuntimeError, match="smaller than the pitch"):
+        bpy.ops.bubble_pattern.add(pitch=0.006, diameter=0.007)
+    assert list(bpy.data.objects) == [base]
+
+
+def last_operator() -> dict[str, float]:
+    """Properties of the operator that Adjust Last Operation shows."""
+    properties = bpy.context.window_manager.operators[-1].properties
+    return {name: getattr(properties, name) for name in properties.keys()}  # noqa: SIM118
+
+
+def test_adjust_last_operation_shows_what_was_chosen_and_takes_another_pitch() -> None:
+    select_faces(plate(), on_top)
+    bpy.ops.ed.undo_push(message="before")
+    assert bpy.ops.bubble_pattern.add('EXEC_DEFAULT', True) == {'FINISHED'}
+    settings = pattern_of(bpy.context.object).bubble_pattern
+    shown = last_operator()
+    pitch, diameter, count = settings.pitch, settings.diameter, settings.count
+    assert (shown["pitch"], shown["diameter"]) == (pitch, diameter)
+
+    for change, wanted in (
+        ({"pitch": 2 * pitch}, (2 * pitch, 2 * diameter)),
+        ({"diameter": diameter / 2}, (pitch, diameter / 2)),
+        ({"pitch": 2 * pitch, "diameter": diameter / 2}, (2 * pitch, diameter / 2)),
+        ({}, (pitch, diameter)),
+    ):
+        bpy.ops.ed.undo()
+        assert [obj.name for obj in bpy.data.objects] == ["Plate"]
+        assert [mesh.name for mesh in bpy.data.meshes] == ["Cube"]
+        bpy.ops.object.mode_set(mode='OBJECT')
+        assert "bubble_region" not in bpy.data.meshes["Cube"].attributes
+        bpy.ops.object.mode_set(mode='EDIT')
+        assert bpy.ops.bubble_pattern.add('EXEC_DEFAULT', True, **{**shown, **change}) == {'FINISHED'}
+        settings = pattern_of(bpy.context.object).bubble_pattern
+        assert (settings.pitch, settings.diameter) == pytest.approx(wanted, rel=1e-5)
+        assert settings.count == pytest.approx(count * (pitch / wanted[0]) ** 2, rel=0.15)
+        after = last_operator()
+        assert (after["pitch"], after["diameter"]) == pytest.approx(wanted, rel=1e-5)
 
 
 def test_defaults_leave_room_for_rows_in_a_strip() -> None:
@@ -176,12 +231,17 @@ def test_preview_shows_every_feature_in_its_size_and_direction() -> None:
     assert np.allclose(along, tangent / np.linalg.norm(tangent, axis=1, keepdims=True), atol=1e-4)
 
 
-def test_a_second_pattern_has_a_region_of_its_own() -> None:
+def two_patterns() -> tuple[bpy.types.Object, bpy.types.Object, bpy.types.Object]:
+    """A base, the pattern on its top, and the one that was added below."""
     base = plate()
     first = add_on_top(base)
     select_faces(base, lambda face: face.normal.z < -0.7)
     bpy.ops.bubble_pattern.add()
-    second = pattern_of(bpy.context.object)
+    return base, first, pattern_of(base)
+
+
+def test_a_second_pattern_has_a_region_of_its_own() -> None:
+    _base, first, second = two_patterns()
     assert second != first
     assert second.bubble_pattern.region != first.bubble_pattern.region
     assert np.allclose(points(first)[:, 2], 0.005)
@@ -189,11 +249,7 @@ def test_a_second_pattern_has_a_region_of_its_own() -> None:
 
 
 def test_the_sidebar_shows_the_newest_pattern_or_the_one_chosen() -> None:
-    base = plate()
-    first = add_on_top(base)
-    select_faces(base, lambda face: face.normal.z < -0.7)
-    bpy.ops.bubble_pattern.add()
-    second = pattern_of(base)
+    base, first, second = two_patterns()
     assert second not in {first, None}
     base.bubble_pattern.pattern = first
     assert pattern_of(base) == first
@@ -220,7 +276,8 @@ def test_cancelling_leaves_nothing() -> None:
 
     base = plate()
     select_faces(base, on_top)
-    steps = BUBBLE_PATTERN_OT_add.steps(None, bpy.context)
+    operator = SimpleNamespace(wanted_lengths=lambda: (None, None))
+    steps = BUBBLE_PATTERN_OT_add.steps(operator, bpy.context)
     for _ in range(3):
         next(steps)
     steps.close()
@@ -244,6 +301,29 @@ def test_settings_lay_the_pattern_anew_as_they_change() -> None:
     assert settings.trouble.startswith("Diameter = ")
     assert "leaves no web" in settings.trouble
     with pytest.raises(RuntimeError, match="leaves no web"):
+        bpy.ops.bubble_pattern.update()
+
+
+@pytest.mark.parametrize(
+    ("system", "scale", "diameter", "pitch"),
+    [
+        ('METRIC', 1.0, "9 mm", "8 mm"),
+        ('METRIC', 0.001, "9 µm", "8 µm"),
+        ('IMPERIAL', 1.0, "354.3 thou", "315 thou"),
+        ('NONE', 1.0, "0.009", "0.008"),
+    ],
+)
+def test_errors_tell_lengths_in_the_scene_s_unit(
+    system: str, scale: float, diameter: str, pitch: str
+) -> None:
+    units = bpy.context.scene.unit_settings
+    units.system, units.scale_length = system, scale
+    settings = add_on_top(plate()).bubble_pattern
+    settings.pitch = 0.008
+    settings.diameter = 0.009
+    told = f"Diameter = {diameter} leaves no web at pitch {pitch}:"
+    assert settings.trouble.startswith(told)
+    with pytest.raises(RuntimeError, match=f"Error: {told}"):
         bpy.ops.bubble_pattern.update()
 
 

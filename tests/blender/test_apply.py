@@ -234,6 +234,56 @@ def test_attributes_of_every_domain_are_carried() -> None:
     assert len(creased) == 12
 
 
+def weights(part: bpy.types.Object, name: str) -> dict[int, float]:
+    """Weight of each vertex that is in the vertex group."""
+    index = part.vertex_groups[name].index
+    pairs = [(v.index, e.weight) for v in part.data.vertices for e in v.groups if e.group == index]
+    return dict(pairs)
+
+
+@pytest.mark.parametrize("blind", [False, True], ids=["through", "blind"])
+def test_vertex_groups_are_carried(blind: bool) -> None:
+    base = plate()
+    ramp, half, _, nil = (base.vertex_groups.new(name=name) for name in ("Ramp", "Half", "Empty", "Nil"))
+    for vertex in base.data.vertices:
+        ramp.add([vertex.index], vertex.co.x / 0.1 + 0.5, 'REPLACE')
+        if vertex.co.x < 0:
+            half.add([vertex.index], 0.75, 'REPLACE')
+        nil.add([vertex.index], 0.0, 'REPLACE')
+    half.lock_weight = True
+    base.vertex_groups.active = half
+    pattern = add_on_top(base)
+    if blind:
+        pattern.bubble_pattern.depth_mode, pattern.bubble_pattern.depth = 'BLIND', 0.004
+    part = apply()
+    assert [group.name for group in part.vertex_groups] == ["Ramp", "Half", "Empty", "Nil"]
+    assert [group.lock_weight for group in part.vertex_groups] == [False, True, False, False]
+    assert part.vertex_groups.active.name == "Half"
+    x = np.array([vertex.co.x for vertex in part.data.vertices])
+    inside = np.abs(x) < 0.05 - 1e-6
+    found = weights(part, "Ramp")
+    rim = [v for v in np.flatnonzero(inside) if abs(part.data.vertices[v].co.z - 0.005) < 1e-6]
+    assert len(rim) > 1000
+    assert np.allclose([found[v] for v in rim], x[rim] / 0.1 + 0.5, atol=1e-5)
+    found = weights(part, "Half")
+    assert np.allclose([found[v] for v in rim], 0.75 * (0.5 - x[rim] / 0.1), atol=1e-5)
+    corners = np.flatnonzero(~inside)
+    assert {v for v in corners if v in found} == {v for v in corners if x[v] < 0}
+    assert weights(part, "Empty") == {}
+    assert sorted(weights(part, "Nil")) == corners.tolist()
+
+
+def test_vertex_groups_of_the_modified_mesh_are_carried() -> None:
+    base = panel()
+    base.vertex_groups.new(name="All").add(range(len(base.data.vertices)), 1.0, 'REPLACE')
+    base.modifiers.new("Fine", 'SUBSURF').levels = 1
+    add_on_top(base)
+    part = apply()
+    found = weights(part, "All")
+    assert sorted(found) == list(range(len(part.data.vertices)))
+    assert np.allclose(list(found.values()), 1.0, atol=1e-5)
+
+
 def test_blind_holes_leave_the_wall_closed() -> None:
     base = plate()
     pattern = add_on_top(base)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -42,6 +43,13 @@ def saved(folder: Path) -> str:
     return path
 
 
+def run(folder: Path, region: str) -> tuple[Path, dict[str, Any]]:
+    """Save what is there as the base and run the batch on it: the folder of its results, and the report."""
+    out = folder / "out"
+    assert batch.main([recipe(folder, region), "--base", saved(folder), "--out", str(out), "--quiet"]) == 0
+    return out, json.loads((out / "report.json").read_text())
+
+
 def opened(folder: Path) -> bpy.types.Object:
     """The pattern in the .blend that a run left behind."""
     bpy.ops.wm.open_mainfile(filepath=str(folder / "pattern.blend"))
@@ -73,11 +81,7 @@ def test_a_blend_in_and_out(tmp_path: Path) -> None:
     base.location = (1, 2, 3)
     base.rotation_euler = (0.1, 0.2, 0.3)
     base.scale = (1, 1, -1)
-    path = saved(tmp_path)
-    out = tmp_path / "out"
-    arguments = [recipe(tmp_path, 'material = "Front"'), "--base", path, "--out", str(out), "--quiet"]
-    assert batch.main(arguments) == 0
-    report = json.loads((out / "report.json").read_text())
+    out, report = run(tmp_path, 'material = "Front"')
     assert report["watertight"]
     pattern = opened(out)
     check_editable(pattern, report["features"])
@@ -87,13 +91,10 @@ def test_a_blend_in_and_out(tmp_path: Path) -> None:
 def test_modifiers_are_part_of_the_base(tmp_path: Path) -> None:
     base = plate()
     base.modifiers.new("Bevel", 'BEVEL').width = 0.001
-    path = saved(tmp_path)
-    out = tmp_path / "out"
-    arguments = [recipe(tmp_path, "near = [0, 0, 0.005]"), "--base", path, "--out", str(out), "--quiet"]
-    assert batch.main(arguments) == 0
+    out, report = run(tmp_path, "near = [0, 0, 0.005]")
     pattern = opened(out)
     assert np.allclose(points(pattern)[:, 2], 0.005, atol=1e-6)
-    check_editable(pattern, json.loads((out / "report.json").read_text())["features"])
+    check_editable(pattern, report["features"])
 
 
 def test_the_inner_side_of_a_solidified_base_is_left_out(tmp_path: Path) -> None:
@@ -101,11 +102,7 @@ def test_the_inner_side_of_a_solidified_base_is_left_out(tmp_path: Path) -> None
     base.modifiers.new("Wall", 'SOLIDIFY').thickness = 0.003
     marked = base.data.attributes.new("Grille", 'BOOLEAN', 'FACE')
     marked.data.foreach_set("value", [face.center.length < 0.06 for face in base.data.polygons])
-    path = saved(tmp_path)
-    out = tmp_path / "out"
-    arguments = [recipe(tmp_path, 'attribute = "Grille"'), "--base", path, "--out", str(out), "--quiet"]
-    assert batch.main(arguments) == 0
-    report = json.loads((out / "report.json").read_text())
+    out, report = run(tmp_path, 'attribute = "Grille"')
     assert report["genus"] == report["features"]
     pattern = opened(out)
     assert (points(pattern, "normal")[:, 2] > 0.5).all()
@@ -119,7 +116,9 @@ def test_the_open_file_is_the_base_of_the_command(tmp_path: Path) -> None:
     assert (out / "part.stl").exists()
 
 
-def test_a_mesh_file_becomes_an_editable_blend(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_mesh_file_becomes_an_editable_blend(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.setattr(batch_base, "render_part", partial(batch_base.render_part, size=(120, 90)))
     x, y, z = 80.0, 60.0, 4.0
     corners = np.array([[i, j, k] for k in (0, z) for j in (0, y) for i in (0, x)])
@@ -137,7 +136,12 @@ def test_a_mesh_file_becomes_an_editable_blend(tmp_path: Path, monkeypatch: pyte
         str(out),
         "--quiet",
     ]
+    capfd.readouterr()
     assert batch.main(arguments) == 0
+    said = capfd.readouterr()
+    assert said.err == ""
+    assert said.out.count("\n") == 1  # nothing of what Blender says of saving and rendering
+    assert "watertight part in" in said.out
     assert picture_has_dark_and_light(out / "part.png")
     check_editable(opened(out), json.loads((out / "report.json").read_text())["features"])
     assert bpy.context.scene.unit_settings.length_unit == 'MILLIMETERS'

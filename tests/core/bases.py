@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+import trimesh
 
-from bubble_pattern_addon.core.mesh import Floats, Mesh
+from bubble_pattern_addon.core.mesh import Floats, Ints, Mesh
 from bubble_pattern_addon.core.metric import Places
 from bubble_pattern_addon.core.pattern import Pattern
 
@@ -12,6 +13,22 @@ CUBE_FACES = np.array(
     [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1]]
     + [[2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]
 )
+
+
+def as_mesh(body: trimesh.Trimesh) -> Mesh:
+    return Mesh(np.array(body.vertices, dtype=float), np.array(body.faces, dtype=np.int64))
+
+
+def halves(a: Ints, b: Ints, c: Ints, d: Ints) -> Ints:
+    """Two triangles for each quad with these corners, any shape: first a b c of all, then a c d of all."""
+    a, b, c, d = (corner.ravel() for corner in (a, b, c, d))
+    return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+
+
+def grid(rows: int, columns: int) -> Ints:
+    """Triangles of a grid of points, row by row: two for each of its rows x columns cells, see `halves`."""
+    at = np.arange((rows + 1) * (columns + 1)).reshape(rows + 1, columns + 1)
+    return halves(at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:])
 
 
 def box(low: tuple[float, ...], high: tuple[float, ...]) -> Mesh:
@@ -55,16 +72,10 @@ def slab(count: int = 12, size: float = 24.0, thickness: float = 1.5) -> Mesh:
     top = np.stack([x, y, height(x, y)], axis=1)
     number = len(top)
     at = np.arange(number).reshape(count + 1, count + 1)
-    a, b, c, d = at[:-1, :-1].ravel(), at[1:, :-1].ravel(), at[1:, 1:].ravel(), at[:-1, 1:].ravel()
-    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    faces = grid(count, count)
     rim = np.concatenate([at[:-1, 0], at[-1, :-1], at[:0:-1, -1], at[0, :0:-1]])
     after = np.roll(rim, -1)
-    side = np.concatenate(
-        [
-            np.stack([rim, rim + number, after + number], axis=1),
-            np.stack([rim, after + number, after], axis=1),
-        ]
-    )
+    side = halves(rim, rim + number, after + number, after)
     return Mesh(
         np.concatenate([top, top - [0, 0, thickness]]),
         np.concatenate([faces, faces[:, ::-1] + number, side]),

@@ -17,6 +17,7 @@ from bubble_pattern_addon.core import files
 from bubble_pattern_addon.core.export import COLUMNS
 from bubble_pattern_addon.core.progress import Progress
 from bubble_pattern_addon.core.recipe import load_recipe
+from scripts import pattern_batch
 
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "scripts" / "pattern_batch.py"
@@ -161,7 +162,7 @@ def test_material_and_attribute_choose_the_region(run, tmp_path: Path) -> None:
     assert len((folder / "features.csv").read_bytes().splitlines()) == len(by_attribute.splitlines())
 
 
-LIMITS = "[limits]\nmin_margin = 1.5\n"
+LIMITS = "[limits]\nmin_margin = 1.5\nmin_diameter = 1.9\n"
 BAD = {
     "missing base": (GRILLE, Path("nowhere.stl"), "does not exist"),
     "no base": (GRILLE, None, "add --base MODEL"),
@@ -176,7 +177,12 @@ BAD = {
     "face without area": (GRILLE, with_flat_face(plate()), "area"),
     "pitch over region": (TOP + "[packing]\npitch = 90\n", plate(), "pitch"),
     "a million features": (TOP + "[packing]\npitch = 0.01\n", plate(), "more than 1,000,000"),
-    "margin": (GRILLE + LIMITS, plate(), "raise edge_offset by"),
+    "no feature left": (GRILLE + LIMITS.replace("1.5", "15"), plate(), "No feature is left"),
+    "an attribute that is not there": (
+        TOP + '[packing]\npitch = { kind = "attribute", name = "x", from = 1, to = 2 }\n',
+        plate(),
+        '[packing] pitch: name = "x": the base has no attribute',
+    ),
     "too thick": (GRILLE.replace("2]", "100]"), trimesh.creation.box((40, 30, 200)), "too thick to pierce"),
 }
 
@@ -185,6 +191,16 @@ BAD = {
 def test_bad_input_gets_one_line_and_leaves_nothing(name: str, run) -> None:
     recipe, base, words = BAD[name]
     check_refusal(run(recipe, base), words)
+
+
+def test_only_blind_holes_may_start_from_both_sides_of_a_wall(run) -> None:
+    body = plate()
+    body.face_attributes["both"] = (np.abs(body.face_normals[:, 2]) > 0.9).astype(np.uint8)
+    recipe = GRILLE.replace("near = [0, 0, 2]", "attribute = 'both'")
+    check_refusal(run(recipe, body), "keep one side")
+    code, _, err, folder = run(recipe + "[feature]\ndepth = 0.5\n", body)
+    assert (code, err) == (0, "")
+    assert json.loads((folder / "report.json").read_text())["genus"] == 0
 
 
 def test_a_base_that_passes_through_itself_is_refused(run) -> None:
@@ -249,36 +265,46 @@ def test_progress_goes_from_stage_to_stage(run, capsys, tmp_path: Path) -> None:
 # -- as a program of its own ---------------------------------------------------------------------------------
 
 
-def program(*arguments: str | Path, cwd: Path) -> subprocess.CompletedProcess:
-    command = [sys.executable, SCRIPT, *arguments]
-    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=120, check=False)
-
-
 def test_the_program_makes_a_part(tmp_path: Path) -> None:
     (tmp_path / "grille.toml").write_text(GRILLE)
     (tmp_path / "base.stl").write_bytes(plate().export(file_type="stl"))
-    done = program("grille.toml", "--base", "base.stl", "--out", "out", "--quiet", cwd=tmp_path)
+    command = [sys.executable, SCRIPT, "grille.toml", "--base", "base.stl", "--out", "out", "--quiet"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
     assert (done.returncode, done.stderr) == (0, "")
     assert (tmp_path / "out" / "part.stl").exists()
 
 
-def test_the_program_refuses_in_one_line(tmp_path: Path) -> None:
+@pytest.fixture
+def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture):
+    """The program's `main` in this process, in a folder with a recipe: (exit code, output, error)."""
     (tmp_path / "grille.toml").write_text(GRILLE)
-    done = program("grille.toml", "--base", "nowhere.stl", "--out", "out", cwd=tmp_path)
-    assert done.returncode == 1
-    assert done.stderr == "pattern_batch.py: Base nowhere.stl does not exist: check the path\n"
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", [str(SCRIPT), *arguments])
+        code = pattern_batch.main()
+        said = capsys.readouterr()
+        return code, said.out, said.err
+
+    return run
+
+
+def test_the_program_refuses_in_one_line(program, tmp_path: Path) -> None:
+    code, _, err = program("grille.toml", "--base", "nowhere.stl", "--out", "out")
+    assert code == 1
+    assert err == "pattern_batch.py: Base nowhere.stl does not exist: check the path\n"
     assert not (tmp_path / "out").exists()
-    done = program("grille.toml", cwd=tmp_path)
-    assert done.returncode == 2
-    assert done.stderr.count("\n") == 1
-    assert "--out" in done.stderr
+    code, _, err = program("grille.toml")
+    assert code == 2
+    assert err.count("\n") == 1
+    assert "--out" in err
 
 
-def test_help_shows_an_example(tmp_path: Path) -> None:
-    done = program("--help", cwd=tmp_path)
-    assert done.returncode == 0
-    assert "--base panel.stl --out grille" in done.stdout
-    assert "pitch = 3.0" in done.stdout
+def test_help_shows_an_example(program) -> None:
+    code, out, _ = program("--help")
+    assert code == 0
+    assert "--base panel.stl --out grille" in out
+    assert "pitch = 3.0" in out
 
 
 # -- real parts ----------------------------------------------------------------------------------------------

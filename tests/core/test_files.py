@@ -13,9 +13,7 @@ from bubble_pattern_addon.core.files import SUFFIXES, load_base, output_folder, 
 from bubble_pattern_addon.core.mesh import Mesh
 from bubble_pattern_addon.core.threemf import CORE, write_3mf
 
-
-def as_mesh(body: trimesh.Trimesh) -> Mesh:
-    return Mesh(np.array(body.vertices, dtype=float), np.array(body.faces, dtype=np.int64))
+from .bases import as_mesh
 
 
 def body(mesh: Mesh) -> trimesh.Trimesh:

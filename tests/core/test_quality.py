@@ -12,12 +12,12 @@ from hypothesis.extra import numpy as arrays
 from scipy.spatial import Voronoi
 from scipy.spatial.transform import Rotation
 
+from bubble_pattern_addon.core.distance import boundary_distance
 from bubble_pattern_addon.core.mesh import Floats, Mesh
 from bubble_pattern_addon.core.metric import Places
 from bubble_pattern_addon.core.pattern import Pattern
 from bubble_pattern_addon.core.quality import (
     REACH,
-    boundary_distance,
     measure,
     measure_points,
     min_margin,
@@ -44,12 +44,20 @@ def up(points: Floats) -> Floats:
     return np.tile(UP, (len(points), 1))
 
 
+def rectangle(points: Floats, margin: float) -> Floats:
+    """Corners of the rectangle `margin` outside the points' bounds, counter-clockwise, (4, 3)."""
+    low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
+    return np.array([[low[0], low[1], 0], [high[0], low[1], 0], [high[0], high[1], 0], [low[0], high[1], 0]])
+
+
+def whole(corners: Floats) -> Region:
+    """The region that is one quad with these corners."""
+    return make_region(Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]])), np.ones(2, bool))
+
+
 def frame(points: Floats, margin: float) -> Floats:
     """Segments of the rectangle `margin` outside the points' bounds."""
-    low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
-    corners = np.array(
-        [[low[0], low[1], 0], [high[0], low[1], 0], [high[0], high[1], 0], [low[0], high[1], 0]]
-    )
+    corners = rectangle(points, margin)
     return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
 
 
@@ -135,7 +143,7 @@ def test_bubbles_in_one_place_have_no_gap():
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(0.001, 1000), st.floats(0, 0.4))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_figures_do_not_depend_on_unit_place_or_direction(seed: int, scale: float, jitter: float):
     rng = np.random.default_rng(seed)
     points = hexagonal(14, 14)
@@ -157,7 +165,7 @@ def test_figures_do_not_depend_on_unit_place_or_direction(seed: int, scale: floa
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(0.05, 0.6))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_planar_neighbours_are_the_delaunay_edges(seed: int, jitter: float):
     rng = np.random.default_rng(seed)
     points = hexagonal(24, 24)
@@ -242,7 +250,7 @@ coordinate = st.floats(-100, 100, allow_nan=False, width=32)
     arrays.arrays(float, st.tuples(st.integers(1, 8), st.just(3)), elements=coordinate),
     arrays.arrays(float, st.tuples(st.integers(1, 30), st.just(2), st.just(3)), elements=coordinate),
 )
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_boundary_distance_is_exact(points: Floats, segments: Floats):
     expected = [min(segment_distance(point, a, b) for a, b in segments) for point in points]
     np.testing.assert_allclose(boundary_distance(points, segments), expected, rtol=1e-9, atol=1e-9)
@@ -269,8 +277,7 @@ class Case:
 @pytest.fixture
 def case() -> Case:
     """Three bubbles in a row on a rectangle of 10 by 4."""
-    corners = np.array([[0.0, 0, 0], [10, 0, 0], [10, 4, 0], [0, 4, 0]])
-    region = make_region(Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]])), np.ones(2, bool))
+    region = whole(np.array([[0.0, 0, 0], [10, 0, 0], [10, 4, 0], [0, 4, 0]]))
     position = np.array([[2.0, 2, 0], [5.0, 2, 0], [8.5, 2, 0]])
     places = Places(position, np.zeros(3, np.int64), np.tile([1.0, 0, 0], (3, 1)))
     axis = np.tile([1.0, 0, 0], (3, 1))
@@ -310,11 +317,7 @@ def test_open_area_is_the_share_of_the_circles(case: Case):
 
 def test_measuring_a_pattern_takes_the_region_and_the_rows_from_it(case: Case):
     points = hexagonal(12, 12)
-    low, high = points.min(axis=0) - 0.5, points.max(axis=0) + 0.5
-    corners = np.array(
-        [[low[0], low[1], 0], [high[0], low[1], 0], [high[0], high[1], 0], [low[0], high[1], 0]]
-    )
-    region = make_region(Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]])), np.ones(2, bool))
+    region = whole(rectangle(points, 0.5))
     n = len(points)
     row = np.where(boundary_distance(points, region.boundary_segments) < 0.6, 0, 1)
     places = Places(points, np.zeros(n, np.int64), np.tile([1.0, 0, 0], (n, 1)))

@@ -48,6 +48,7 @@ def recipes(draw: st.DrawFn) -> Recipe:
         packing=Packing(
             pitch=Constant(pitch),
             edge_offset=draw(st.floats(0, 10)),
+            orientation=draw(st.sampled_from(["edge", "best", (1.0, 0.0, -0.5)])),
             integrator=draw(st.sampled_from(["fire", "rk4"])),
             seed=draw(st.integers(0, 2**40)),
             iterations=draw(st.integers(1, 10**6)),
@@ -73,6 +74,13 @@ def recipes(draw: st.DrawFn) -> Recipe:
 @given(recipes())
 def test_a_recipe_written_and_read_is_the_same_recipe(recipe: Recipe) -> None:
     assert recipe_from_dict(tomllib.loads(recipe_to_toml(recipe))) == recipe
+
+
+def test_an_error_tells_its_lengths_as_asked() -> None:
+    error = RecipeError("A web of {web} at {pitch}", web=0.5, pitch=2.0)
+    assert str(error) == "A web of 0.5 at 2"
+    assert error.told(lambda value: f"{1000 * value:g} mm") == "A web of 500 mm at 2000 mm"
+    assert str(RecipeError("a {name} in braces")) == "a {name} in braces"
 
 
 @given(st.floats(1e-9, 1e9))
@@ -148,6 +156,9 @@ BAD = {
     "iterations broken": ("[packing]\niterations = 1.5", "whole number"),
     "seed": ("[packing]\nseed = -1", "at least 0"),
     "tolerance": ("[packing]\ntolerance = 0", "above 0"),
+    "gap without parts": ("[region]\nall = true\ngap = 2.0", "name these too"),
+    "orientation": ("[packing]\norientation = 'bets'", 'did you mean "best"'),
+    "orientation that is none": ("[packing]\norientation = [0, 0, 0]", "no direction"),
     "integrator": ("[packing]\nintegrator = 'rk5'", 'did you mean "rk4"'),
     "kind": ("[feature]\nkind = 'holes'", 'did you mean "hole"'),
     "depth": ("[feature]\ndepth = 0", "above 0"),

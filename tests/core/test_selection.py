@@ -9,12 +9,9 @@ from hypothesis import strategies as st
 from bubble_pattern_addon.core.errors import RecipeError, RegionError
 from bubble_pattern_addon.core.mesh import Mesh
 from bubble_pattern_addon.core.recipe import RegionChoice
-from bubble_pattern_addon.core.selection import grown, nearest_triangle, neighbour_pairs, select
+from bubble_pattern_addon.core.selection import grown, nearest_triangle, neighbour_pairs, select, sub_regions
 
-
-def as_mesh(body: trimesh.Trimesh) -> Mesh:
-    return Mesh(np.array(body.vertices, dtype=float), np.array(body.faces, dtype=np.int64))
-
+from .bases import as_mesh
 
 BOX = as_mesh(trimesh.creation.box((2, 4, 6)))
 DRUM = as_mesh(trimesh.creation.cylinder(radius=5, height=4, sections=36))
@@ -64,11 +61,13 @@ def test_triangles_without_area_or_numbers_are_never_the_nearest() -> None:
         nearest_triangle(Mesh(vertices, mesh.triangles[:1]), np.zeros(3))
 
 
+GRID = np.array([[i, j, 40 - i - j] for i in range(41) for j in range(41 - i)]) / 40
+SAMPLES = np.einsum("gk,tkx->tgx", GRID, DRUM.corners)
+
+
 @given(st.tuples(*[st.floats(-20, 20)] * 3))
 def test_the_nearest_triangle_is_the_nearest_by_dense_sampling(point: tuple[float, float, float]) -> None:
-    grid = np.array([[i, j, 40 - i - j] for i in range(41) for j in range(41 - i)]) / 40
-    samples = np.einsum("gk,tkx->tgx", grid, DRUM.corners)
-    sampled = np.linalg.norm(samples - point, axis=2).min(axis=1)
+    sampled = np.linalg.norm(SAMPLES - point, axis=2).min(axis=1)
     chosen = nearest_triangle(DRUM, np.array(point))
     assert sampled[chosen] <= sampled.min() + 0.2  # spacing of the samples on the largest triangle
 
@@ -91,3 +90,12 @@ def test_names_mean_the_faces_that_carry_them() -> None:
         select(BOX, RegionChoice())
     with pytest.raises(RegionError, match="the base has no faces"):
         select(Mesh(BOX.vertices, BOX.triangles[:0]), RegionChoice(all=True))
+
+
+def test_sub_regions_are_numbered_in_their_order_and_the_first_has_what_two_share():
+    masks = {"Centre": np.array([True, True, False, False]), "Rim": np.array([False, True, True, False])}
+    choice = RegionChoice(all=True, parts=("Rim", "Centre"))
+    assert sub_regions(choice, {"Centre": masks["Centre"]}, {"Rim": masks["Rim"]}).tolist() == [2, 1, 1, 0]
+    assert sub_regions(RegionChoice(all=True)) is None
+    with pytest.raises(RegionError, match='did you mean "Centre"'):
+        sub_regions(RegionChoice(all=True, parts=("Center",)), masks)

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bubble_pattern_addon.core.errors import RegionError
 from bubble_pattern_addon.core.mesh import Bools, Floats, Ints, Mesh
-from bubble_pattern_addon.core.sides import LOOKS, faced_side, lies_on_both_sides
+from bubble_pattern_addon.core.sides import LOOKS, check_one_side, faced_side, lies_on_both_sides
+
+from .bases import grid, halves
 
 SIZE = 40.0
 
@@ -17,11 +22,9 @@ def sheet(cells: int, bend: float = 6.0) -> Mesh:
     """A square surface curved both ways, its normals up."""
     line = np.linspace(-SIZE / 2, SIZE / 2, cells + 1)
     x, y = np.meshgrid(line, line, indexing="ij")
-    at = np.arange((cells + 1) ** 2).reshape(cells + 1, cells + 1)
-    a, b, c, d = at[:-1, :-1].ravel(), at[1:, :-1].ravel(), at[1:, 1:].ravel(), at[:-1, 1:].ravel()
     height = bend * np.cos(x / 12) * np.cos(y / 12)
     places = np.stack([x.ravel(), y.ravel(), height.ravel()], axis=1)
-    return Mesh(places, np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]))
+    return Mesh(places, grid(cells, cells))
 
 
 def thickened(surface: Mesh, thickness: float, offset: float) -> tuple[Mesh, Ints]:
@@ -51,7 +54,7 @@ def inner_part(surface: Mesh) -> Bools:
     return np.abs(surface.corners.mean(axis=1)[:, :2]).max(axis=1) < SIZE / 3
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     cells=st.integers(3, 12),
     thickness=st.floats(0.05, 2.0),
@@ -89,9 +92,7 @@ def test_a_mirrored_copy_follows_the_surface_it_is_joined_to() -> None:
     angle, along = np.meshgrid(around, length, indexing="ij")
     at = np.arange(angle.size).reshape(angle.shape)
     ahead = np.roll(at, -1, axis=0)
-    a, b = at[:, :-1].ravel(), ahead[:, :-1].ravel()
-    c, d = ahead[:, 1:].ravel(), at[:, 1:].ravel()
-    triangles = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    triangles = halves(at[:, :-1], ahead[:, :-1], ahead[:, 1:], at[:, 1:])
     places = np.stack([20 * np.cos(angle), 20 * np.sin(angle), along], axis=2).reshape(-1, 3)
     tube = Mesh(places, triangles)
     half = tube.corners.mean(axis=1)[:, 1] > 0
@@ -106,7 +107,10 @@ def test_sides_selected_by_hand_stay(selected_sides: tuple[int, ...]) -> None:
     selected = np.isin(side, selected_sides)
     kept = faced_side(wall, selected, Mesh(wall.vertices, wall.triangles[selected]))
     assert np.array_equal(kept, selected)
-    assert lies_on_both_sides(wall, selected) == (len(selected_sides) == 2)
+    both = len(selected_sides) == 2
+    assert lies_on_both_sides(wall, selected) == both
+    with pytest.raises(RegionError, match="both sides of the wall") if both else nullcontext():
+        check_one_side(wall, selected)
 
 
 def test_without_an_original_surface_nothing_is_left_out() -> None:
@@ -131,8 +135,7 @@ def test_a_rounded_rim_that_joins_both_sides_does_not_lead_to_the_other() -> Non
     places: Floats = np.concatenate([np.insert(outline, 1, y, axis=1) for y in depth])
     at = np.arange(n * (cells + 1)).reshape(cells + 1, n)
     ahead = np.roll(at, -1, axis=1)
-    a, b, c, d = at[:-1].ravel(), ahead[:-1].ravel(), ahead[1:].ravel(), at[1:].ravel()
-    tube = Mesh(places, np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]))
+    tube = Mesh(places, halves(at[:-1], ahead[:-1], ahead[1:], at[1:]))
     up = tube.area_vectors[:, 2] / np.linalg.norm(tube.area_vectors, axis=1)
     assert (up[tube.corners[:, :, 2].min(axis=1) > 0.99] > 0.99).all()
     corners = np.array([[-15, 0, 1], [15, 0, 1], [15, 20, 1], [-15, 20, 1]], dtype=float)

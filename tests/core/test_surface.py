@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,7 +11,7 @@ from hypothesis import strategies as st
 
 from bubble_pattern_addon.core.errors import RegionError
 from bubble_pattern_addon.core.mesh import Mesh
-from bubble_pattern_addon.core.region import make_region, weld
+from bubble_pattern_addon.core.region import Region, make_region, weld
 from bubble_pattern_addon.core.surface import (
     Spots,
     make_charts,
@@ -22,7 +24,8 @@ from bubble_pattern_addon.core.surface import (
 from scripts.shapes import SHAPES
 
 
-def region_of(name: str):
+@cache
+def region_of(name: str) -> Region:
     shape = SHAPES[name]()
     return make_region(shape.mesh, shape.selected)
 
@@ -32,7 +35,7 @@ def scattered(region, n: int, seed: int) -> Spots:
     return Spots(chance.integers(0, len(region.triangles), n), chance.dirichlet([1, 1, 1], n))
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(0, 10**6), st.floats(0.01, 30))
 def test_in_the_plane_a_walk_is_straight(seed, length):
     region = region_of("trapezoid-fine")

@@ -6,7 +6,9 @@ import re
 import tomllib
 from pathlib import Path
 
-from bubble_pattern_addon.core.recipe import READERS, recipe_from_dict
+from bubble_pattern_addon.core.field_tables import KINDS
+from bubble_pattern_addon.core.field_tables import READERS as FIELD_READERS
+from bubble_pattern_addon.core.recipe import READERS, Recipe, recipe_from_dict
 
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text("utf-8")
@@ -51,6 +53,28 @@ def test_the_readme_s_table_has_every_key_under_its_table_and_no_other() -> None
         section = row[0].strip("`[]") or section
         told.setdefault(section, set()).add(row[1])
     assert told == {section: set(readers) for section, readers in READERS.items()}
+
+
+def test_the_readme_names_every_kind_of_field_and_every_key_of_it() -> None:
+    text = README[README.index("**Fields.**") : README.index("## For developers")]
+    named = set(re.findall(r"`([a-z]+)`", text)) | set(re.findall(r"(\w+) = ", text))
+    keys = {key for key in FIELD_READERS if key not in named}
+    assert keys == set()
+    assert [kind for kind in KINDS if kind not in named] == []
+
+
+def test_the_readme_s_defaults_are_the_recipe_s() -> None:
+    recipe, section, compared = Recipe(), "", 0
+    for row in re.findall(r"^\| (`\[\w+\]`)? ?\| `(\w+).*\| ([^|]+) \|$", README, re.MULTILINE):
+        section = row[0].strip("`[]") or section
+        default = getattr(getattr(recipe, section), row[1])
+        if isinstance(default, (int, float)) and not isinstance(default, bool):
+            assert float(row[2]) == default, row[1]
+            compared += 1
+        elif isinstance(default, str):
+            assert row[2] == f'`"{default}"`', row[1]
+            compared += 1
+    assert compared >= 9
 
 
 def test_the_readme_s_commands_name_scripts_that_are_there() -> None:

@@ -24,9 +24,9 @@ Lengths = Callable[[Spots], Floats]
 
 SIX = np.exp(1j * np.pi / 3 * np.arange(6))
 # Proposals closer together than this share of the pitch mean the same place; bubbles are born no closer than
-# CROWDED.
+# CROWDED, or CROWDED_CLOSED where no boundary gives way and gaps between what has grown apart would stay.
 SAME = 0.5
-CROWDED = 0.78
+CROWDED, CROWDED_CLOSED = 0.78, 0.7
 # Bubbles of so many generations are searched anew for each generation; older ones only when they have become
 # many.
 RECENT = 4
@@ -41,7 +41,8 @@ def grow(
     after generation. Ends early when there are more than `most`. With a `field` of sixth powers of directions
     in the triangles' frames, (R,), the rows follow it wherever it is not 0.
     """
-    crowd = _Crowd(charts, float(pitch(seeds).max()))
+    crowded = CROWDED if field is None else CROWDED_CLOSED
+    crowd = _Crowd(charts, float(pitch(seeds).max()), crowded)
     spots, heading = seeds, directions
     crowd.add(seeds)
     front, front_heading = seeds, directions
@@ -70,15 +71,15 @@ def _following(heading: Complex, six: Complex) -> Complex:
 class _Crowd:
     """Bubbles born so far, to be asked who is near: it keeps search trees from one question to the next."""
 
-    def __init__(self, charts: Charts, reach: float) -> None:
-        self.charts, self.reach = charts, reach
-        self.old = np.empty((0, 7))
+    def __init__(self, charts: Charts, reach: float, crowded: float) -> None:
+        self.charts, self.reach, self.crowded = charts, reach, crowded
+        self.old: list[Floats] = []
         self.old_tree: cKDTree | None = None
         self.recent: list[Floats] = []
         self.recent_tree: cKDTree | None = None
 
     def where(self, spots: Spots) -> Floats:
-        """Coordinates (n, 7) in which bubbles on facing sheets are far apart."""
+        """Coordinates in which bubbles on facing sheets are far apart, the points first."""
         return signature(self.charts.region, positions(self.charts, spots), spots.row, self.reach)
 
     def add(self, spots: Spots) -> None:
@@ -86,14 +87,14 @@ class _Crowd:
         if not len(spots.row):
             return
         self.recent.append(self.where(spots))
-        if len(self.recent) > RECENT and sum(map(len, self.recent)) > 0.3 * len(self.old):
-            self.old = np.concatenate([self.old, *self.recent[:-RECENT]])
-            self.old_tree = cKDTree(self.old, balanced_tree=False, compact_nodes=False)
+        if len(self.recent) > RECENT and sum(map(len, self.recent)) > 0.3 * sum(map(len, self.old)):
+            self.old = [np.concatenate([*self.old, *self.recent[:-RECENT]])]
+            self.old_tree = cKDTree(self.old[0], balanced_tree=False, compact_nodes=False)
             self.recent = self.recent[-RECENT:]
         self.recent_tree = cKDTree(np.concatenate(self.recent), balanced_tree=False, compact_nodes=False)
 
     def distance(self, at: Floats, within: float) -> Floats:
-        """Distance from each of `at` (n, 7) to the nearest bubble, infinite beyond `within`."""
+        """Distance from each of `at`, as of `where`, to the nearest bubble; infinite beyond `within`."""
         trees = [tree for tree in (self.old_tree, self.recent_tree) if tree is not None]
         found = [tree.query(at, distance_upper_bound=within)[0] for tree in trees]
         return np.min(found, axis=0)
@@ -134,7 +135,7 @@ def _agreed(
         return proposals, heading
     local = pitch(proposals)
     at = crowd.where(proposals)
-    free = crowd.distance(at, CROWDED * local.max()) > CROWDED * local
+    free = crowd.distance(at, crowd.crowded * local.max()) > crowd.crowded * local
     proposals, heading, local, at = proposals.take(free), heading[free], local[free], at[free]
     if not len(local):
         return proposals, heading
@@ -153,6 +154,6 @@ def _agreed(
     mean_six = np.bincount(group, six.real, groups) + 1j * np.bincount(group, six.imag, groups)
     own = heading[first] ** 6
     correction = np.exp(1j * np.angle(mean_six / own) / 6)
-    pairs = close_pairs(crowd.where(moved.arrived), CROWDED * local[first])
+    pairs = close_pairs(crowd.where(moved.arrived), crowd.crowded * local[first])
     kept = uncrowded(pairs, np.lexsort((np.arange(groups), -votes)).argsort())
     return moved.arrived.take(kept), product(moved.carried, correction)[kept]

@@ -7,18 +7,20 @@ import numpy as np
 from ..boundary import make_boundary, nearest_boundary, signature
 from ..errors import RegionError
 from ..mesh import Floats
-from ..metric import Field, Places
-from ..progress import Progress, Steps
+from ..metric import Constant, Field, Places
+from ..progress import Progress, Steps, within
+from ..quality import measure_points
 from ..recipe import Packing
 from ..region import Region
 from ..surface import Charts, Complex, Spots, make_charts, positions, to_frame, walk
-from .bubbles import Bubbles, Ground, all_spots
+from .bubbles import Bubbles, Ground, can_move, joined
 from .crowding import close_pairs, uncrowded
 from .direction import smooth_directions
 from .force import STIFFNESS, stiff_law
 from .lattice import grow
 from .narrows import in_the_narrows
-from .population import control
+from .plane import fills_its_box, lay
+from .population import control, pressed_out
 from .relax import relax
 from .rim import (
     FirstRow,
@@ -40,9 +42,14 @@ CLEAR_OF_RIM = 1.0
 LONG_ENOUGH = 6.0
 # Bubbles of the first row closer than this, as across a narrow neck, do not both fit.
 TOO_CLOSE = 0.8
+# Directions that are tried for the best arrangement, in degrees; sixty mean the same lattice.
+TURNS = (0.0, 15.0, 30.0, 45.0)
+# Where nothing holds the bubbles together they are packed at this share of the pitch that would fill the
+# surface exactly.
+CRAMPED = 1.02
 # Rounds of relaxation and population control, and how many steps each may take; the last phases' steps.
 ROUNDS = 3
-STIFF_STEPS = 60
+STIFF_STEPS = 45
 
 
 def pack_steps(region: Region, packing: Packing) -> Steps[tuple[Ground, Bubbles]]:
@@ -51,12 +58,49 @@ def pack_steps(region: Region, packing: Packing) -> Steps[tuple[Ground, Bubbles]
     charts = make_charts(region)
     pitch = _pitch_over(region, packing.pitch)
     _check_count(region, pitch)
-    ground = _ground(charts, pitch, packing.edge_offset)
-    row, held = in_the_narrows(ground, _without_conflicts(ground, first_row(ground.track)))
+    uniform = packing.pitch.value if isinstance(packing.pitch, Constant) else None
+    ground = _ground(charts, pitch, uniform, packing.edge_offset)
+    along, between = in_the_narrows(ground, _without_conflicts(ground, first_row(ground.track)))
+    first = spots_on_track(charts, ground.track, along.arc) if len(along.arc) else _nobody()
+    fixed = joined(first, between)
+    if packing.orientation == "best":
+        return ground, (yield from _best_of_several(ground, fixed, packing))
+    rows = packing.orientation if isinstance(packing.orientation, tuple) else None
+    return ground, (yield from _settled(ground, fixed, packing, *_seeds(ground, packing.seed, rows)))
+
+
+def _best_of_several(ground: Ground, fixed: Spots, packing: Packing) -> Steps[Bubbles]:
+    """The best of the arrangements whose rows start along the longest straight edge and TURNS of it."""
+    seeds, directions = _seeds(ground, packing.seed, None)
+    best, highest = Bubbles(fixed, len(fixed.row)), -np.inf
+    for number, turn in enumerate(TURNS):
+        trial = _settled(ground, fixed, packing, seeds, directions * np.exp(1j * np.radians(turn)))
+        bubbles = yield from within(trial, number / len(TURNS), (number + 1) / len(TURNS))
+        merit = _merit(ground, bubbles)
+        if merit > highest:
+            best, highest = bubbles, merit
+    return best
+
+
+def _merit(ground: Ground, bubbles: Bubbles) -> float:
+    """How good an arrangement looks: order and smallest gap, each between 0 and 1."""
+    region, spots = ground.charts.region, bubbles.spots
+    quality = measure_points(
+        positions(ground.charts, spots),
+        region.normals[spots.row],
+        local_pitch(ground, bubbles),
+        can_move(bubbles).astype(np.int64),
+        region.boundary_segments,
+    )
+    return float(np.nansum([quality.six, quality.psi6, quality.gap_min]))
+
+
+def _settled(
+    ground: Ground, fixed: Spots, packing: Packing, seeds: Spots, directions: Complex
+) -> Steps[Bubbles]:
+    """Bubbles in balance: those that are `fixed`, and a lattice from `seeds` with rows along `directions`."""
     yield Progress("Growing the lattice", 0.1)
-    free = _lattice(ground, row, packing.seed)
-    free = Spots(np.concatenate([held.row, free.row]), np.concatenate([held.barycentric, free.barycentric]))
-    bubbles = Bubbles(row, free, len(held.row))
+    bubbles = Bubbles(joined(fixed, _lattice(ground, seeds, directions)), len(fixed.row))
     if not len(bubbles):
         raise RegionError(
             "No bubble fits into the target region: it is narrower than one pitch everywhere; use a smaller "
@@ -66,19 +110,37 @@ def pack_steps(region: Region, packing: Packing) -> Steps[tuple[Ground, Bubbles]
         yield Progress("Packing the bubbles", 0.2 + 0.2 * number)
         local = local_pitch(ground, bubbles)
         settle = relax if packing.integrator == "fire" else integrate
-        bubbles, _ = settle(ground, bubbles, local, packing.iterations, packing.tolerance)
+        bubbles, _ = settle(ground, bubbles, _filling(ground, local), packing.iterations, packing.tolerance)
         bubbles, changed = control(ground, bubbles, local)
         if not changed:
             break
     yield Progress("Evening out the gaps", 0.8)
-    local = local_pitch(ground, bubbles)
-    bubbles, _ = relax(ground, bubbles, local, STIFF_STEPS, packing.tolerance, stiff_law, 1.0 + STIFFNESS)
-    return ground, bubbles
+    while True:
+        local = local_pitch(ground, bubbles)
+        size, stiffness = _filling(ground, local), 1.0 + STIFFNESS
+        bubbles, _ = relax(ground, bubbles, size, STIFF_STEPS, packing.tolerance, stiff_law, stiffness)
+        kept = ~pressed_out(ground, bubbles, local_pitch(ground, bubbles))
+        if kept.all():
+            return bubbles
+        # What stiff contacts have squeezed through the first row has no place between it and the boundary.
+        bubbles = Bubbles(bubbles.spots.take(kept), bubbles.fixed)
+
+
+def _filling(ground: Ground, local: Floats) -> Floats:
+    """The pitches (n,) at which n bubbles of the `local` ones fill a surface without a boundary.
+
+    Nothing holds them together there: whoever is missing for a full arrangement would leave the others loose
+    and uneven.
+    """
+    if ground.boundary is not None:
+        return local
+    room = ground.charts.region.area / (np.sqrt(0.75) * (local**2).sum())
+    return local * max(CRAMPED * np.sqrt(room), 1.0)
 
 
 def local_pitch(ground: Ground, bubbles: Bubbles) -> Floats:
     """Packing metric at the bubbles, (n,)."""
-    return ground.pitch(all_spots(ground, bubbles))
+    return ground.pitch(bubbles.spots)
 
 
 def _pitch_over(region: Region, field: Field) -> Lengths:
@@ -105,7 +167,7 @@ def _check_count(region: Region, pitch: Lengths) -> None:
         )
 
 
-def _ground(charts: Charts, pitch: Lengths, edge_offset: float) -> Ground:
+def _ground(charts: Charts, pitch: Lengths, uniform: float | None, edge_offset: float) -> Ground:
     rim = charts.region.rim
     if not len(rim):
         nothing = np.empty(0)
@@ -113,11 +175,16 @@ def _ground(charts: Charts, pitch: Lengths, edge_offset: float) -> Ground:
         track = Track(
             empty, np.empty((0, 3)), nothing, empty.row, empty.row.astype(bool), nothing.astype(bool)
         )
-        return Ground(charts, None, track, pitch, edge_offset)
+        return Ground(charts, None, track, pitch, uniform, edge_offset)
     finest = float(pitch(Spots(rim[:, 0], np.full((len(rim), 3), 1 / 3))).min())
     boundary = make_boundary(charts.region, finest / 8)
     assert boundary is not None
-    return Ground(charts, boundary, inset_track(charts, boundary, pitch, edge_offset), pitch, edge_offset)
+    track = inset_track(charts, boundary, pitch, edge_offset)
+    return Ground(charts, boundary, track, pitch, uniform, edge_offset)
+
+
+def _nobody() -> Spots:
+    return Spots(np.empty(0, dtype=np.int64), np.empty((0, 3)))
 
 
 def _where(charts: Charts, spots: Spots, reach: float) -> Floats:
@@ -128,32 +195,40 @@ def _without_conflicts(ground: Ground, row: FirstRow) -> FirstRow:
     """The first row less those too close, as across a neck or in an acute corner; corners go last."""
     if not len(row.arc):
         return row
-    spots = spots_on_track(ground.charts, ground.track, row.wrapped())
+    spots = spots_on_track(ground.charts, ground.track, row.arc)
     local = ground.pitch(spots)
     pairs = close_pairs(_where(ground.charts, spots, float(local.max())), TOO_CLOSE * local)
-    rank = np.lexsort((np.arange(len(local)), row.high > row.low)).argsort()
-    kept = uncrowded(pairs, rank)
-    return FirstRow(*(values[kept] for values in (row.arc, row.low, row.high, row.top, row.around)))
+    rank = np.lexsort((np.arange(len(local)), ~row.corner)).argsort()
+    return row.take(uncrowded(pairs, rank))
 
 
-def _lattice(ground: Ground, row: FirstRow, seed: int) -> Spots:
+def _lattice(ground: Ground, seeds: Spots, directions: Complex) -> Spots:
     """Bubbles of a lattice that fills what the first row leaves free."""
     charts = ground.charts
-    seeds, directions = _seeds(ground, seed)
+    uniform = ground.uniform if charts.region.flat else None
+    if uniform is not None and ground.boundary is not None and fills_its_box(charts, uniform):
+        clear = CLEAR_OF_RIM * uniform + ground.edge_offset
+        return lay(charts, ground.boundary, uniform, clear, seeds, directions)
     closed = np.bincount(charts.region.sheet[charts.region.rim[:, 0]], minlength=len(seeds.row)) == 0
     field = smooth_directions(charts, closed[charts.region.sheet]) if closed.any() else None
     if field is not None:
         directions = np.where(closed, field[seeds.row] ** (1 / 6), directions)
     spots, _ = grow(charts, ground.pitch, seeds, directions, MOST, field)
+    return _clear_of_rim(ground, spots)
+
+
+def _clear_of_rim(ground: Ground, spots: Spots) -> Spots:
+    """The lattice less what would be in the first row's way."""
     if ground.boundary is None:
         return spots
     local = ground.pitch(spots)
-    distance, _ = nearest_boundary(ground.boundary, positions(charts, spots), spots.row)
+    distance, _ = nearest_boundary(ground.boundary, positions(ground.charts, spots), spots.row)
     return spots.take(distance > CLEAR_OF_RIM * local + ground.edge_offset)
 
 
-def _seeds(ground: Ground, seed: int) -> tuple[Spots, Complex]:
-    """One start of the lattice for each connected part of the region, and the direction of its rows.
+def _seeds(ground: Ground, seed: int, rows: tuple[float, float, float] | None) -> tuple[Spots, Complex]:
+    """One start of the lattice for each connected part of the region, and the direction of its rows: along
+    the vector `rows` if that is given and not square to the surface there.
 
     A part with a straight edge starts there, so that lattice and first row are one; any other in its middle.
     A `seed` other than 0 turns and shifts them by chance, for another pattern of the same recipe.
@@ -171,6 +246,10 @@ def _seeds(ground: Ground, seed: int) -> tuple[Spots, Complex]:
         along = to_frame(charts, on_rim.row, tangent)
         seeds.row[sheet[best]], seeds.barycentric[sheet[best]] = on_rim
         directions[sheet[best]] = along / np.abs(along)
+    if rows is not None:
+        along = to_frame(charts, seeds.row, np.tile(rows, (len(seeds.row), 1)))
+        lies = np.abs(along) > 1e-6 * np.linalg.norm(rows)
+        directions = np.where(lies, along / np.where(lies, np.abs(along), 1.0), directions)
     if seed:
         chance = np.random.default_rng(seed)
         directions *= np.exp(1j * chance.uniform(0, np.pi / 3, len(directions)))

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from ..boundary import nearest_boundary, signature
 from ..mesh import Bools, Floats, Ints
 from ..surface import Charts, Spots, positions, to_frame, walk
-from .bubbles import Bubbles, Ground, points_and_rows
+from .bubbles import Bubbles, Ground, joined
 from .crowding import close_pairs, uncrowded
 from .force import Pairs, find_pairs
 
@@ -19,7 +19,8 @@ VOID = 0.8
 # Free bubbles nearer to the boundary than this many radii have been pressed through the first row.
 PRESSED_OUT = 2.2
 # A bubble whose overlap ratio is above this is too crowded; it is 6 in the hexagonal arrangement.
-CROWDED = 8.0
+# Where the pitch is graded, rows of fewer bubbles follow rows of more: whoever is left over goes earlier.
+CROWDED, CROWDED_GRADED = 6.8, 6.4
 # Only bubbles with less overlap than this can stand at a void.
 LONELY = 5.6
 
@@ -38,36 +39,36 @@ def overlap_ratio(pairs: Pairs, distance: Floats, pitch: Floats) -> Floats:
 
 def control(ground: Ground, bubbles: Bubbles, pitch: Floats) -> tuple[Bubbles, int]:
     """Bubbles without the too crowded ones and with new ones in the voids; and how many came or went."""
-    points, row, _ = points_and_rows(ground, bubbles)
+    points, row, m = positions(ground.charts, bubbles.spots), bubbles.spots.row, bubbles.fixed
     pairs = find_pairs(ground.charts, points, row, pitch, 0.0)
     distance = np.linalg.norm(points[pairs.first] - points[pairs.second], axis=1)
     ratio = overlap_ratio(pairs, distance, pitch)
-    m = len(bubbles.first_row.arc)
-    gone = _pressed_out(ground, points[m:], row[m:], pitch[m:]) | _too_crowded(pairs, distance, ratio, m)
-    gone[: bubbles.held] = False
+    gone = pressed_out(ground, bubbles, pitch)
+    most = CROWDED if ground.uniform is not None else CROWDED_GRADED
+    gone[m:] |= _too_crowded(pairs, distance, ratio, m, most)
     added = _voids(ground, points, row, pitch, np.flatnonzero(ratio < LONELY))
     if not gone.any() and not len(added.row):
         return bubbles, 0
-    stay = bubbles.free.take(~gone)
-    free = Spots(np.concatenate([stay.row, added.row]), np.concatenate([stay.barycentric, added.barycentric]))
-    return Bubbles(bubbles.first_row, free, bubbles.held), int(gone.sum()) + len(added.row)
+    return Bubbles(joined(bubbles.spots.take(~gone), added), m), int(gone.sum()) + len(added.row)
 
 
-def _pressed_out(ground: Ground, points: Floats, row: Ints, pitch: Floats) -> Bools:
-    """Free bubbles between the first row and the boundary."""
-    if ground.boundary is None or not len(points):
-        return np.zeros(len(points), dtype=bool)
-    distance, _ = nearest_boundary(ground.boundary, points, row)
-    return distance < PRESSED_OUT * pitch / 2 + ground.edge_offset
+def pressed_out(ground: Ground, bubbles: Bubbles, pitch: Floats) -> Bools:
+    """Which bubbles, (n,), are between the first row and the boundary."""
+    out = np.zeros(len(bubbles), dtype=bool)
+    free = bubbles.spots.take(np.arange(bubbles.fixed, len(bubbles)))
+    if ground.boundary is not None and len(free.row):
+        distance, _ = nearest_boundary(ground.boundary, positions(ground.charts, free), free.row)
+        out[bubbles.fixed :] = distance < PRESSED_OUT * pitch[bubbles.fixed :] / 2 + ground.edge_offset
+    return out
 
 
-def _too_crowded(pairs: Pairs, distance: Floats, ratio: Floats, m: int) -> Bools:
-    """Free bubbles that are crowded and no neighbour of theirs is more so, among n - m free ones."""
+def _too_crowded(pairs: Pairs, distance: Floats, ratio: Floats, m: int, most: float) -> Bools:
+    """Which of the n - m free bubbles have an overlap ratio above `most` while no neighbour has more."""
     closest = np.full(len(ratio), np.inf)
     relative = distance / pairs.stable
     np.minimum.at(closest, pairs.first, relative)
     np.minimum.at(closest, pairs.second, relative)
-    crowded = (ratio > CROWDED) | (closest < 0.6)
+    crowded = (ratio > most) | (closest < 0.6)
     crowded[:m] = False
     rivals = crowded[pairs.first] & crowded[pairs.second]
     order = np.lexsort((np.arange(len(ratio)), -ratio)).argsort()

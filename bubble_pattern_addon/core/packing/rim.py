@@ -18,6 +18,8 @@ FINENESS = 5
 # A turn of the inset line by more than this within 0.7 pitch is a sharp corner and gets a bubble of its own.
 SHARP = np.radians(40.0)
 CORNER_SCALE = 0.35
+# Corners nearer to each other than this, in pitches, share one bubble: two rows do not fit between them.
+ONE_CORNER = 0.85
 # Bubbles of the first row are never spaced closer than this share of the pitch.
 CLOSEST = 0.92
 # A stretch of the first row is straight when it turns by less than this in all.
@@ -46,23 +48,17 @@ class Track:
 
 @dataclass(frozen=True)
 class FirstRow:
-    """Bubbles on the track: arc (n,) where they are; low, high (n,) how far they may slide (equal for a
-    corner's); top, around (n,): where a line that closes on itself ends and how long it is, infinite and 0
-    for an open one.
+    """Bubbles on the track: arc (n,) where they are; corner (n,) whether one stands at a sharp corner; around
+    (n,): the length of its line where that closes on itself, 0 for an open one.
     """
 
     arc: Floats
-    low: Floats
-    high: Floats
-    top: Floats
+    corner: Bools
     around: Floats
 
-    def wrapped(self) -> Floats:
-        """The arcs brought back onto their lines, (n,): a bubble may have slid past a closed one's end."""
-        closed = self.around > 0
-        top = np.where(closed, self.top, self.arc)
-        beyond = np.floor((top - self.arc) / np.where(closed, self.around, 1.0))
-        return self.arc + beyond * self.around
+    def take(self, which: Bools) -> FirstRow:
+        """The bubbles `which`."""
+        return FirstRow(self.arc[which], self.corner[which], self.around[which])
 
 
 def inset_track(charts: Charts, boundary: Boundary, pitch: Lengths, edge_offset: float) -> Track:
@@ -96,10 +92,10 @@ def _walked_inward(charts: Charts, boundary: Boundary, radius: Lengths) -> tuple
     at, opposite = row[owner], corner[owner]
     start = _on_edges(at, opposite, share)
     inward = 1j * (charts.corners[at, (opposite + 2) % 3] - charts.corners[at, (opposite + 1) % 3])
-    length = radius(start)
-    walked = walk(charts, start, inward / np.abs(inward) * length)
+    size = radius(start)
+    walked = walk(charts, start, inward / np.abs(inward) * (size + region.reserve[owner]))
     distance, _ = _to_boundary(charts, boundary, walked.arrived)
-    kept = (walked.left == 0) & (distance >= length * (1 - 1e-3))
+    kept = (walked.left == 0) & (distance >= size * (1 - 1e-3))
     edges = [len(loop) for loop in region.loops]
     loop = np.repeat(np.arange(len(edges)), edges)[owner]
     settled = _settled(charts, boundary, radius, walked.arrived.take(kept))
@@ -216,7 +212,7 @@ def _knots(
         barys.append(spots.barycentric[run])
         if number + 1 < len(chain) or closed:
             corner = _corner(charts, spots, run, chain[(number + 1) % len(chain)])
-            if corner is not None:
+            if corner is not None and _keeps_radius(charts, boundary, radius, corner):
                 rows.append(corner.row)
                 barys.append(corner.barycentric)
     if closed:
@@ -243,6 +239,12 @@ def _corner(charts: Charts, spots: Spots, before: Ints, after: Ints) -> Spots | 
         return None
     last = spots.take(before[-1:])
     return walk(charts, last, to_frame(charts, last.row, reach * ahead[None])).arrived
+
+
+def _keeps_radius(charts: Charts, boundary: Boundary, radius: Lengths, corner: Spots) -> bool:
+    """Whether a corner is on the inset line: beside a rounded one, lines meet outside it."""
+    distance, _ = _to_boundary(charts, boundary, corner)
+    return bool((distance > (1 - 1e-2) * radius(corner)).all())
 
 
 def _filled(charts: Charts, boundary: Boundary, radius: Lengths, knots: Spots) -> Spots:
@@ -312,44 +314,74 @@ def _sharp_knots(points: Floats, arc: Floats, chain: Ints, closed: Bools) -> Boo
     # A closed line's first knot stands again as its last: the first speaks for both.
     turn[last[closed]] = 0.0
     sharp = np.zeros(len(arc), dtype=bool)
+    for line in range(len(closed)):
+        knots = np.arange(first[line], last[line] + 1)
+        length = arc[last[line]] - arc[first[line]] if closed[line] else np.inf
+        sharp[knots[_corners(arc[knots] - arc[first[line]], turn[knots], length)]] = True
+    return sharp
+
+
+def _corners(arc: Floats, turn: Floats, around: float) -> Ints:
+    """Which knots of a line, at `arc` (k,), are its corners, from how far it turns there, (k,).
+
+    A corner is where the line turns most. Corners so near one another that one bubble stands for them, as at
+    the end of a strip, are one in their middle. around: the line's length if it is closed, else infinite
+    """
+
+    def apart(one: Floats | float, other: Floats | float) -> Floats:
+        return np.minimum(np.abs(one - other), np.abs(around - np.abs(one - other)))
+
+    peaks: list[int] = []
     candidates = np.flatnonzero(turn > SHARP)
     for knot in candidates[np.argsort(-turn[candidates], kind="stable")]:
-        distance = np.abs(arc[candidates] - arc[knot])
-        distance = np.where(around[knot] > 0, np.minimum(distance, np.abs(around[knot] - distance)), distance)
-        near = candidates[(chain[candidates] == chain[knot]) & (distance < 2 * CORNER_SCALE)]
-        sharp[knot] = not sharp[near].any()
-    return sharp
+        if not peaks or apart(arc[peaks], arc[knot]).min() > CORNER_SCALE:
+            peaks.append(int(knot))
+    found: list[int] = []
+    groups = _groups(np.sort(peaks), arc, around)
+    for group in groups:
+        low, high = arc[group[0]], arc[group[-1]]
+        middle = (low + high + (around if high < low else 0.0)) / 2
+        middle -= around if middle >= around else 0.0
+        found.append(int(np.abs(arc - middle).argmin()))
+    return np.array(found, dtype=np.int64)
+
+
+def _groups(peaks: Ints, arc: Floats, around: float) -> list[Ints]:
+    """Peaks in the order of the line, in groups of those nearer to the next than two corners' bubbles fit."""
+    if len(peaks) < 2:
+        return [peaks] if len(peaks) else []
+    groups = np.split(peaks, np.flatnonzero(np.diff(arc[peaks]) > ONE_CORNER) + 1)
+    if len(groups) > 1 and around - arc[peaks[-1]] + arc[peaks[0]] <= ONE_CORNER:
+        groups = [np.concatenate([groups[-1], groups[0]]), *groups[1:-1]]
+    return groups
 
 
 def first_row(track: Track) -> FirstRow:
     """Bubbles of the first row: one at every sharp corner, the others evenly spaced between (in local
     pitches).
     """
-    parts: list[Floats] = []
+    parts: list[FirstRow] = []
     for number, closed in enumerate(track.closed):
         knots = np.flatnonzero(track.chain == number)
         low, high = track.arc[knots[0]], track.arc[knots[-1]]
-        fixed = track.arc[knots[track.sharp[knots]]]
-        top, around = (high, high - low) if closed else (np.inf, 0.0)
-        if closed and not len(fixed):
-            count = _count(high - low)
-            arc = low + (high - low) * np.arange(count) / count
-            parts.append(np.stack([arc, *np.broadcast_arrays(-np.inf, np.inf, top, around, arc)[:4]]))
-            continue
-        ends = np.append(fixed, fixed[0] + high - low) if closed else fixed
-        for start, stop in pairwise(ends):
+        corners = track.arc[knots[track.sharp[knots]]]
+        around = high - low if closed else 0.0
+        ends = np.append(corners, corners[0] + around) if closed and len(corners) else corners
+        stretches = list(pairwise(ends)) if len(ends) else [(low, high)]
+        for start, stop in stretches:
             count = _count(stop - start)
             arc = start + (stop - start) * np.arange(count) / count
-            corner = np.arange(count) == 0
-            parts.append(
-                np.stack(
-                    [arc, np.where(corner, arc, start), np.where(corner, arc, stop)]
-                    + [np.full(count, value) for value in (top, around)]
-                )
-            )
+            corner = (np.arange(count) == 0) & bool(len(ends))
+            parts.append(FirstRow(np.where(arc > high, arc - around, arc), corner, np.full(count, around)))
         if not closed:
-            parts.append(np.array([[ends[-1]], [ends[-1]], [ends[-1]], [top], [around]]))
-    return FirstRow(*np.concatenate(parts, axis=1)) if parts else FirstRow(*np.empty((5, 0)))
+            parts.append(FirstRow(ends[-1:], np.ones(1, dtype=bool), np.zeros(1)))
+    if not parts:
+        return FirstRow(np.empty(0), np.empty(0, dtype=bool), np.empty(0))
+    return FirstRow(
+        np.concatenate([part.arc for part in parts]),
+        np.concatenate([part.corner for part in parts]),
+        np.concatenate([part.around for part in parts]),
+    )
 
 
 def _count(length: float) -> int:

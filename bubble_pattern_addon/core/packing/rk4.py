@@ -7,7 +7,8 @@ import numpy as np
 from ..mesh import Floats
 from .bubbles import Bubbles, Ground, can_move
 from .force import Law, force_law
-from .relax import LONGEST_STEP, Work, bubbles_of, links_of, list_anew, move, pull_on, swarm_of, twin
+from .relax import LONGEST_STEP
+from .swarm import SKIN, Work, bubbles_of, land, links_of, list_anew, move, pull_on, swarm_of, twin
 
 # Time step in units of sqrt(m/k0): the lattice swings with at most sqrt(6), RK4 is stable up to 2.8.
 STEP = 0.5
@@ -28,25 +29,29 @@ def integrate(
     links = links_of(swarm, everyone)
     velocity = np.zeros((len(everyone), 3))
     for _ in range(iterations):
-        if list_anew(swarm, everyone):
+        if list_anew(swarm, everyone, SKIN / 2):
             links = links_of(swarm, everyone)
         slopes: list[tuple[Floats, Floats]] = []
         for share in (0.0, 0.5, 0.5, 1.0):
             stage = twin(swarm)
             moving, speeding = slopes[-1] if slopes else (velocity, np.zeros_like(velocity))
             if share:
-                move(stage, everyone, share * STEP * moving * pitch[everyone, None])
+                move(stage, links, share * STEP * moving, 0.0)
+                land(stage, everyone)
             speed = velocity + share * STEP * speeding
             slopes.append((speed, pull_on(stage, links, law) - DAMPING * speed))
         weights = (1 / 6, 1 / 3, 1 / 3, 1 / 6)
-        step = STEP * sum(weight * moving for weight, (moving, _) in zip(weights, slopes, strict=True))
+        step = np.zeros_like(velocity)
+        for weight, (moving, _) in zip(weights, slopes, strict=True):
+            step += STEP * weight * moving
         longest = float(np.sqrt(np.einsum("nc,nc->n", step, step).max(initial=0.0)))
         if longest > LONGEST_STEP:
             step *= LONGEST_STEP / longest
         velocity = velocity + STEP * sum(
             weight * gain for weight, (_, gain) in zip(weights, slopes, strict=True)
         )
-        move(swarm, everyone, step * pitch[everyone, None])
+        move(swarm, links, step, longest)
+        land(swarm, everyone)
         if longest < tolerance and float(np.abs(slopes[0][1]).max(initial=0.0)) < tolerance / STEP:
             break
     return bubbles_of(swarm), swarm.work

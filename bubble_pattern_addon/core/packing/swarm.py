@@ -1,0 +1,204 @@
+"""The bubbles as arrays in motion: who acts on whom, the forces, and steps along the surface.
+
+Between two landings bubbles move in the tangent planes they stand on, which is exact in the plane and off by
+a share of a thousandth of the pitch elsewhere; landing walks them over the surface to where they belong.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.sparse import csc_array
+
+from ..mesh import Floats, Ints
+from ..surface import Spots, positions, to_frame, walk
+from .bubbles import Bubbles, Ground
+from .force import Law, Pairs, find_pairs, renewed_pairs
+
+# Pairs are listed with this reserve, in pitches (small enough to leave a lattice's next shell out, at 1.73),
+# and a bubble's are listed anew when it has moved by half of that.
+SKIN = 0.16
+# Where fewer bubbles are at work, telling some apart from the others costs more than it spares.
+FEW = 3000
+# How far bubbles may move between two landings, in pitches: from AFLOAT at first, less where a landing shifts
+# one by more than OFF, more (but never over FARTHEST) where it shifts all by less than a quarter of that.
+AFLOAT, FARTHEST = 0.1, 0.4
+OFF = 0.01
+
+
+@dataclass
+class Work:
+    """What a relaxation has cost: force evaluations, and the bubbles and pairs these went over."""
+
+    evaluations: int = 0
+    bubbles: int = 0
+    pairs: int = 0
+
+
+@dataclass
+class Swarm:
+    """The bubbles as arrays that the relaxation writes to.
+
+    points: (n, 3) where they are now; landed: (n, 3) where they last were exactly on the surface, there in
+    the triangles row (n,) with barycentric coordinates bary (n, 3) and normal (n, 3); drift: the farthest any
+    may have moved since, in pitches, and afloat: how far they may; pairs are valid while no bubble is farther
+    than half the skin from listed_at (n, 3), and none is farther from there than strayed, in pitches
+    """
+
+    ground: Ground
+    bubbles: Bubbles
+    pitch: Floats
+    points: Floats
+    landed: Floats
+    row: Ints
+    bary: Floats
+    normal: Floats
+    pairs: Pairs
+    listed_at: Floats
+    drift: float = 0.0
+    afloat: float = AFLOAT
+    strayed: float = 0.0
+    work: Work = field(default_factory=Work)
+
+
+def swarm_of(ground: Ground, bubbles: Bubbles, pitch: Floats) -> Swarm:
+    """The bubbles as arrays, with their pairs listed."""
+    charts, spots = ground.charts, bubbles.spots
+    points = positions(charts, spots)
+    return Swarm(
+        ground=ground,
+        bubbles=bubbles,
+        pitch=pitch,
+        points=points,
+        landed=points.copy(),
+        row=spots.row.copy(),
+        bary=spots.barycentric.copy(),
+        normal=charts.region.normals[spots.row],
+        pairs=find_pairs(charts, points, spots.row, pitch, SKIN),
+        listed_at=points.copy(),
+    )
+
+
+def twin(swarm: Swarm) -> Swarm:
+    """The same bubbles once more, to be moved on trial; the list of pairs is shared."""
+    places = ("points", "landed", "row", "bary", "normal")
+    return replace(swarm, **{name: getattr(swarm, name).copy() for name in places})
+
+
+def bubbles_of(swarm: Swarm) -> Bubbles:
+    """The bubbles where the swarm has them."""
+    _walk_there(swarm, np.flatnonzero((swarm.points != swarm.landed).any(axis=1)))
+    return Bubbles(Spots(swarm.row, swarm.bary), swarm.bubbles.fixed)
+
+
+@dataclass(frozen=True)
+class Links:
+    """The pairs that act on the bubbles `active` (a,), and the (a + 1, p) matrix that adds up their forces;
+    its last row takes those on all others.
+
+    pitch: (a, 1); softness: (p,) one over the stable distance
+    """
+
+    active: Ints
+    pairs: Pairs
+    incidence: csc_array
+    pitch: Floats
+    softness: Floats
+
+
+def links_of(swarm: Swarm, active: Ints) -> Links:
+    """The pairs that act on the bubbles `active` (a,)."""
+    n = len(swarm.points)
+    pairs = swarm.pairs
+    # Bubbles that are not active share one place after the last, which nobody reads.
+    place = np.full(n, len(active))
+    place[active] = np.arange(len(active))
+    if len(active) < n:
+        touched = (place[pairs.first] < len(active)) | (place[pairs.second] < len(active))
+        pairs = Pairs(pairs.first[touched], pairs.second[touched], pairs.stable[touched])
+    number = len(pairs.first)
+    rows = np.stack([place[pairs.first], place[pairs.second]], axis=1).ravel()
+    signs = np.tile([1.0, -1.0], number)
+    incidence = csc_array((signs, rows, 2 * np.arange(number + 1)), shape=(len(active) + 1, number))
+    return Links(active, pairs, incidence, swarm.pitch[active, None], 1 / pairs.stable)
+
+
+def pull_on(swarm: Swarm, links: Links, law: Law) -> Floats:
+    """Accelerations (a, 3) of the active bubbles along the surface, in units of the local pitch.
+
+    The contact stiffness is k0/l0^2; with masses of 1/pitch^2 bubbles of all sizes swing at the same pace,
+    and the balance, where the forces vanish, is that of the law.
+    """
+    pairs, active = links.pairs, links.active
+    swarm.work.evaluations += 1
+    swarm.work.bubbles += len(active)
+    swarm.work.pairs += len(pairs.first)
+    away = swarm.points.take(pairs.first, axis=0)
+    away -= swarm.points.take(pairs.second, axis=0)
+    distance = np.sqrt(np.einsum("mc,mc->m", away, away))
+    away *= (law(distance * links.softness) * links.softness / np.maximum(distance, 1e-300))[:, None]
+    pull = (links.incidence @ away)[:-1]
+    pull *= links.pitch
+    if not swarm.ground.charts.region.flat:
+        normal = swarm.normal[active]
+        pull -= np.einsum("nc,nc->n", pull, normal)[:, None] * normal
+    return pull
+
+
+def move(swarm: Swarm, links: Links, steps: Floats, longest: float) -> None:
+    """Move the active bubbles by `steps` (a, 3) in their pitches, none longer than `longest`."""
+    if swarm.drift + longest > swarm.afloat:
+        land(swarm, links.active)
+    swarm.drift += longest
+    swarm.strayed += longest
+    swarm.points[links.active] += steps * links.pitch
+
+
+def land(swarm: Swarm, active: Ints) -> None:
+    """Bring the active bubbles, who alone have moved, back onto the surface."""
+    swarm.drift = 0.0
+    # In a plane the way does not matter, only where it ends.
+    if swarm.ground.charts.region.flat:
+        return
+    before = swarm.points[active]
+    _walk_there(swarm, active)
+    shift = swarm.points[active] - before
+    off = np.sqrt((np.einsum("ac,ac->a", shift, shift) / swarm.pitch[active] ** 2).max(initial=0.0))
+    if off > OFF:
+        swarm.afloat *= 0.5
+    elif off < OFF / 4:
+        swarm.afloat = min(1.5 * swarm.afloat, FARTHEST)
+
+
+def _walk_there(swarm: Swarm, which: Ints) -> None:
+    """Walk the bubbles `which` over the surface to where they are."""
+    charts, start = swarm.ground.charts, Spots(swarm.row[which], swarm.bary[which])
+    steps = to_frame(charts, start.row, swarm.points[which] - swarm.landed[which])
+    arrived = walk(charts, start, steps).arrived
+    swarm.row[which], swarm.bary[which] = arrived
+    swarm.normal[which] = charts.region.normals[arrived.row]
+    swarm.points[which] = swarm.landed[which] = positions(charts, arrived)
+
+
+def list_anew(swarm: Swarm, active: Ints, beyond: float) -> bool:
+    """Find the pairs of those bubbles anew that have moved by more than `beyond` pitches since they were
+    listed; whether any had.
+    """
+    if swarm.strayed < beyond:
+        return False
+    away = swarm.points[active] - swarm.listed_at[active]
+    shift = np.einsum("ac,ac->a", away, away) / swarm.pitch[active] ** 2
+    swarm.strayed = float(np.sqrt(shift.max(initial=0.0)))
+    if swarm.strayed < beyond:
+        return False
+    # Those half-way there are listed along: they would ask for it soon.
+    stale = active[shift > (beyond / 2) ** 2]
+    charts, points, row, pitch = swarm.ground.charts, swarm.points, swarm.row, swarm.pitch
+    if len(stale) > 0.3 * len(points) or len(points) < FEW:
+        swarm.pairs = find_pairs(charts, points, row, pitch, SKIN)
+        swarm.listed_at, swarm.strayed = points.copy(), 0.0
+    else:
+        swarm.pairs = renewed_pairs(swarm.pairs, stale, charts, points, row, pitch, SKIN)
+        swarm.listed_at[stale], swarm.strayed = points[stale], beyond / 2
+    return True
