@@ -53,10 +53,11 @@ class Base:
         """(4, 4) from the frame to the object's coordinates."""
         return np.linalg.inv(self.to_frame)
 
-    def fingerprint(self, selected: Bools) -> str:
-        """A short name for this very geometry with this target region."""
+    def fingerprint(self, selected: Bools, parts: Ints | None = None) -> str:
+        """A short name for this very geometry with this target region and its sub-regions (T,)."""
         digest = hashlib.blake2b(digest_size=16)
-        for array in (self.mesh.vertices, self.mesh.triangles, selected):
+        arrays = [self.mesh.vertices, self.mesh.triangles, selected]
+        for array in arrays if parts is None else [*arrays, parts]:
             digest.update(np.ascontiguousarray(array).tobytes())
         return digest.hexdigest()
 
@@ -70,6 +71,24 @@ def evaluated_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Ite
         yield mesh
     finally:
         evaluated.to_mesh_clear()
+
+
+@contextmanager
+def shown(obj: bpy.types.Object, context: bpy.types.Context) -> Iterator[None]:
+    """Let `obj` be visible for a while: Blender does not run the modifiers of hidden objects."""
+    if obj.name not in context.view_layer.objects:
+        raise BaseError(f'"{obj.name}" is not in this view layer: include its collection')
+    was_hidden, was_disabled = obj.hide_get(), obj.hide_viewport
+    if not was_hidden and not was_disabled:
+        yield
+        return
+    obj.hide_set(False)
+    obj.hide_viewport = False
+    try:
+        yield
+    finally:
+        obj.hide_set(was_hidden)
+        obj.hide_viewport = was_disabled
 
 
 def world_frame(obj: bpy.types.Object) -> Floats:

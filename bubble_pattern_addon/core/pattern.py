@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -75,23 +76,54 @@ def all_bubbles(pattern: Pattern) -> Pattern:
     """Every bubble of the pattern in the order of packing, those whose feature was left out among them."""
     if pattern.dropped is None:
         return pattern
-    parts = (pattern, pattern.dropped)
-    order = np.argsort(np.concatenate([part.ids for part in parts]))
+    both = _end_to_end((pattern, pattern.dropped))
+    order = np.argsort(both.ids)
+    ids = both.ids[order]
+    bubble = None if np.array_equal(ids, np.arange(len(ids))) else ids
+    return replace(take(both, order), bubble=bubble, notes=pattern.notes)
 
-    def joined(name: str) -> Any:
-        return np.concatenate([getattr(part, name) for part in parts])[order]
 
-    places = [part.places for part in parts]
-    names = ("position", "triangle", "barycentric")
-    return Pattern(
-        Places(*(np.concatenate([getattr(place, name) for place in places])[order] for name in names)),
-        **{name: joined(name) for name in COLUMNS},
-        wished=None if pattern.wished is None else joined("wished"),
+def joined(patterns: Sequence[Pattern]) -> Pattern:
+    """Patterns on one base as one, at least one of them; the ids of each go on from those before it."""
+    if len(patterns) == 1:
+        return patterns[0]
+    numbered: list[Pattern] = []
+    first = 0
+    for pattern in patterns:
+        parts = [part for part in (pattern, pattern.dropped) if part is not None]
+        numbered.append(replace(pattern, bubble=pattern.ids + first))
+        if pattern.dropped is not None:
+            dropped = replace(pattern.dropped, bubble=pattern.dropped.ids + first)
+            numbered[-1] = replace(numbered[-1], dropped=dropped)
+        first += 1 + max(int(part.ids.max(initial=-1)) for part in parts)
+    left_out = [pattern.dropped for pattern in numbered if pattern.dropped is not None]
+    return replace(
+        _end_to_end(numbered),
+        dropped=_end_to_end(left_out) if left_out else None,
+        notes=tuple(dict.fromkeys(note for pattern in patterns for note in pattern.notes)),
     )
 
 
-def take(pattern: Pattern, which: Bools) -> Pattern:
-    """The features `which` (n,) with their ids."""
+def _end_to_end(parts: Sequence[Pattern]) -> Pattern:
+    """The features of all parts with their ids, without what was left out."""
+
+    def column(name: str) -> Any:
+        return np.concatenate([getattr(part, name) for part in parts])
+
+    places = [part.places for part in parts]
+    names = ("position", "triangle", "barycentric")
+    known = any(part.wished is not None for part in parts)
+    wished = [part.diameter if part.wished is None else part.wished for part in parts]
+    return Pattern(
+        Places(*(np.concatenate([getattr(place, name) for place in places]) for name in names)),
+        **{name: column(name) for name in COLUMNS},
+        wished=np.concatenate(wished) if known else None,
+        bubble=column("ids"),
+    )
+
+
+def take(pattern: Pattern, which: Bools | Ints) -> Pattern:
+    """The features `which`, a mask (n,) or rows, with their ids."""
     places = pattern.places
     return replace(
         pattern,

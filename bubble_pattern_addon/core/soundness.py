@@ -64,6 +64,11 @@ def sound_base(base: Mesh) -> SoundBase:
     return _known[key]
 
 
+def forget_base() -> None:
+    """Let the next base be looked through anew, for whoever measures what that costs."""
+    _known.clear()
+
+
 def _examined(base: Mesh) -> SoundBase:
     """`sound_base` of a base not seen before."""
     _check_numbers(base)
