@@ -18,6 +18,7 @@ from typing import Any
 from .blending import Fill
 from .errors import RecipeError
 from .field_tables import asks_for_pitch, field_from_toml, field_to_toml
+from .isometries import OFF, check_symmetry
 from .metric import Constant, Described
 from .toml_values import (
     Point,
@@ -59,7 +60,12 @@ class RegionChoice:
 
 @dataclass(frozen=True)
 class Packing:
-    """Step 1. pitch is the packing metric: the distance of neighbouring centres."""
+    """Step 1. pitch is the packing metric: the distance of neighbouring centres.
+
+    symmetry: "off"; "auto", whichever the region has; "x", "xy" and so on, mirrored at planes square to these
+    axes of the base; "rotate 3" or "rotate 3 z", turned into itself by thirds about an axis (see
+    core.isometries); symmetry_centre: a point of the planes or the axis, None for the region's own middle
+    """
 
     pitch: Described = Constant(3.0)
     edge_offset: float = 0.0
@@ -67,6 +73,8 @@ class Packing:
     seed: int = 0
     iterations: int = 60
     tolerance: float = 1e-3
+    symmetry: str = OFF
+    symmetry_centre: Point | None = None
 
 
 @dataclass(frozen=True)
@@ -296,6 +304,8 @@ READERS: dict[str, dict[str, Callable[[object, str], Any]]] = {
         "seed": whole,
         "iterations": whole,
         "tolerance": number,
+        "symmetry": text,
+        "symmetry_centre": point,
     },
     "shaping": {
         "diameter": field_from_toml,
@@ -342,6 +352,9 @@ def check_recipe(recipe: Recipe) -> None:
     check_at_least(packing.seed, 0, "[packing] seed")
     check_at_least(packing.iterations, 1, "[packing] iterations")
     check_above(packing.tolerance, "[packing] tolerance")
+    check_symmetry(packing.symmetry, "[packing] symmetry")
+    for coordinate in packing.symmetry_centre or ():
+        check_finite(coordinate, "[packing] symmetry_centre")
     check_one_of(feature.kind, KINDS, "[feature] kind")
     if feature.depth is not None:
         check_above(feature.depth, "[feature] depth")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..boundary import make_boundary, nearest_boundary, signature
@@ -12,12 +14,14 @@ from ..progress import Progress, Steps
 from ..recipe import Packing
 from ..region import Region
 from ..surface import Charts, Complex, Spots, make_charts, positions, to_frame, walk
+from ..symmetry import find_symmetry
 from .bubbles import Bubbles, Ground, joined
 from .crowding import close_pairs, uncrowded
 from .direction import smooth_directions
 from .force import STIFFNESS, stiff_law
 from .lattice import grow
 from .narrows import in_the_narrows
+from .orbits import settled_leaders, symmetric_start, with_followers
 from .plane import fills_its_box, lay
 from .population import control, pressed_out
 from .relax import relax
@@ -32,6 +36,7 @@ from .rim import (
     straight_stretches,
 )
 from .rk4 import integrate
+from .symmetric_start import loop_starts, suiting, symmetric_seeds
 
 # A recipe that asks for more bubbles than this is taken for a slip of the pen.
 MOST = 1_000_000
@@ -54,11 +59,16 @@ def pack_steps(region: Region, packing: Packing) -> Steps[tuple[Ground, Bubbles]
     _check_count(region, pitch)
     uniform = packing.pitch.value if isinstance(packing.pitch, Constant) else None
     ground = _ground(charts, pitch, uniform, packing.edge_offset)
-    along, between = in_the_narrows(ground, _without_conflicts(ground, first_row(ground.track)))
+    finding = find_symmetry(charts, ground.boundary, pitch, packing.symmetry, packing.symmetry_centre)
+    ground = replace(ground, symmetry=finding.symmetry, notes=finding.notes)
+    row = first_row(ground.track, loop_starts(ground))
+    along, between = in_the_narrows(ground, _without_conflicts(ground, row))
     first = spots_on_track(charts, ground.track, along.arc) if len(along.arc) else _nobody()
     yield Progress("Growing the lattice", 0.1)
     fixed = joined(first, between)
     bubbles = Bubbles(joined(fixed, _lattice(ground, packing.seed)), len(fixed.row))
+    if ground.symmetry is not None:
+        bubbles = symmetric_start(ground, bubbles)
     if not len(bubbles):
         raise RegionError(
             "No bubble fits into the target region: it is narrower than one pitch everywhere; use a smaller "
@@ -78,9 +88,12 @@ def pack_steps(region: Region, packing: Packing) -> Steps[tuple[Ground, Bubbles]
         bubbles, _ = relax(ground, bubbles, local, STIFF_STEPS, packing.tolerance, stiff_law, 1.0 + STIFFNESS)
         kept = ~pressed_out(ground, bubbles, local_pitch(ground, bubbles))
         if kept.all():
-            return ground, bubbles
+            break
         # What stiff contacts have squeezed through the first row has no place between it and the boundary.
         bubbles = Bubbles(bubbles.spots.take(kept), bubbles.fixed)
+    if ground.symmetry is not None:
+        bubbles = with_followers(ground, settled_leaders(ground, bubbles))
+    return ground, bubbles
 
 
 def local_pitch(ground: Ground, bubbles: Bubbles) -> Floats:
@@ -150,11 +163,11 @@ def _without_conflicts(ground: Ground, row: FirstRow) -> FirstRow:
 def _lattice(ground: Ground, seed: int) -> Spots:
     """Bubbles of a lattice that fills what the first row leaves free."""
     charts = ground.charts
-    seeds, directions = _seeds(ground, seed)
+    seeds, directions, origin = symmetric_seeds(ground, *_seeds(ground, seed))
     uniform = ground.uniform if charts.region.flat else None
     if uniform is not None and ground.boundary is not None and fills_its_box(charts, uniform):
         clear = CLEAR_OF_RIM * uniform + ground.edge_offset
-        return lay(charts, ground.boundary, uniform, clear, seeds, directions)
+        return lay(charts, ground.boundary, uniform, clear, seeds, directions, origin)
     closed = np.bincount(charts.region.sheet[charts.region.rim[:, 0]], minlength=len(seeds.row)) == 0
     field = smooth_directions(charts, closed[charts.region.sheet]) if closed.any() else None
     if field is not None:
@@ -183,7 +196,8 @@ def _seeds(ground: Ground, seed: int) -> tuple[Spots, Complex]:
     directions = np.ones(len(seeds.row), dtype=np.complex128)
     if len(track.arc):
         middle, length, sheet = straight_stretches(charts, track)
-        order = np.lexsort((middle, -length, sheet))
+        suits = suiting(ground, on_track(track, middle)[0], ground.pitch(track.spots))
+        order = np.lexsort((middle, -length, ~suits, length <= LONG_ENOUGH, sheet))
         best = order[np.concatenate([[True], np.diff(sheet[order]) != 0])]
         best = best[length[best] > LONG_ENOUGH]
         _, tangent, _ = on_track(track, middle[best])
