@@ -21,8 +21,9 @@ from .crowding import close_pairs, uncrowded
 
 # A bubble nearer to its own image than this, in pitches, stands on the plane or axis instead.
 ON_IT = 0.7
-# Orbits with bubbles closer than this, in pitches, do not both fit.
-APART = 0.74
+# A bubble and an image of another's closer than this, in pitches, do not both fit; nor do two bubbles closer
+# than CROWDED, what is between is left to population control.
+APART, CROWDED = 0.74, 0.45
 # Bubbles this far outside the part of space that is packed, in pitches, may lead as well.
 MARGIN = 0.36
 # Followers this near to a leader, in pitches, are felt by it or may come to be.
@@ -82,7 +83,11 @@ def leaders_of(ground: Ground, candidates: Spots, rank: Ints) -> Ints:
     owner = np.concatenate([np.arange(len(inside)), everyone.leader])
     local = pitch[inside][owner]
     where = signature(charts.region, positions(charts, spots), spots.row, float(local.max(initial=0.0)))
-    pairs = owner[close_pairs(where, APART * local)] if len(local) else np.empty((0, 2), dtype=np.int64)
+    pairs = np.empty((0, 2), dtype=np.int64)
+    if len(local):
+        pairs = close_pairs(where, APART * local)
+        across = (pairs >= len(inside)).sum(axis=1) == 1
+        pairs = owner[np.concatenate([pairs[across], close_pairs(where, CROWDED * local)])]
     pairs = pairs[(pairs[:, 0] != pairs[:, 1]) & ~lost[pairs].any(axis=1)]
     kept = uncrowded(pairs, np.argsort(np.argsort(rank[inside], kind="stable"))) & ~lost
     return inside[kept]
