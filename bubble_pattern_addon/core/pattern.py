@@ -29,7 +29,11 @@ class Pattern:
     wished: (n,) the size that the shaping metric asked for; None where nothing is known of it
     bubble: (n,) number of the feature's bubble, rising; None where every bubble has a feature
     dropped: the bubbles whose feature was left out as too small; None where none was
-    notes: what a designer should know of the sizes, one sentence each
+    notes: what a designer should know of the pattern, one sentence each
+    packing_notes: those of them that are about the packing, which stay when features are shaped anew
+    symmetry: the recipe's word for the symmetry that the bubbles have, None without one
+    partners: (n, k) for each of its isometries, the first of which leaves everything where it is, the id of
+    the bubble to which it takes this one: of its own where it is on the plane or axis
     """
 
     places: Places
@@ -42,6 +46,9 @@ class Pattern:
     bubble: Ints | None = None
     dropped: Pattern | None = None
     notes: tuple[str, ...] = ()
+    packing_notes: tuple[str, ...] = ()
+    symmetry: str | None = None
+    partners: Ints | None = None
 
     def __len__(self) -> int:
         return len(self.pitch)
@@ -87,6 +94,9 @@ def all_bubbles(pattern: Pattern) -> Pattern:
         Places(*(np.concatenate([getattr(place, name) for place in places])[order] for name in names)),
         **{name: joined(name) for name in COLUMNS},
         wished=None if pattern.wished is None else joined("wished"),
+        packing_notes=pattern.packing_notes,
+        symmetry=pattern.symmetry,
+        partners=None if pattern.partners is None else joined("partners"),
     )
 
 
@@ -99,5 +109,6 @@ def take(pattern: Pattern, which: Bools) -> Pattern:
         **{name: getattr(pattern, name)[which] for name in COLUMNS},
         wished=None if pattern.wished is None else pattern.wished[which],
         bubble=pattern.ids[which],
+        partners=None if pattern.partners is None else pattern.partners[which],
         dropped=None,
     )
