@@ -168,6 +168,9 @@ def _off(
     region = finder.charts.region
     spots = finder.spots.take(np.arange(0, len(finder.spots.row), len(finder.spots.row) // most + 1))
     image, place, off = _mirrored(finder, group, number, positions(finder.charts, spots), spots.row)
+    if boundary is not None:
+        # A walk that the boundary stops need not end at the nearest place; for what is outside that is on it.
+        off = np.minimum(off, nearest_boundary(boundary, image, place.row)[0])
     facing = region.normals[spots.row] @ group.turns[number].T
     facing = np.einsum("nc,nc->n", facing, region.normals[place.row])
     worst = float(np.where(facing > SAME_FACING, off, region.extent).max())
@@ -211,8 +214,8 @@ def _found(group: Isometries, word: str) -> tuple[str, ...]:
 
 def _uneven(group: Isometries, share: float) -> str:
     return (
-        f"The pitch is not symmetric under {_where(group)}: {group.needs}, it differs by {100 * share:.3g} %; "
-        "packed without symmetry: give a pitch that is, or another symmetry."
+        f"The pitch is not symmetric under {_where(group)}: {group.needs}, it differs by {100 * share:.3g} "
+        "%; packed without symmetry: give a pitch that is, or another symmetry."
     )
 
 
@@ -221,6 +224,6 @@ def _none(word: str, group: Isometries, off: float, pitch: float) -> str:
     if word == AUTO:
         return f"No symmetry found; the nearest is {_where(group)}, which is off by {far}."
     return (
-        f"The target region is not symmetric under {_where(group)}: {group.needs}, it is off by {far}; packed "
-        "without symmetry: mend the region, or give another symmetry or symmetry_centre."
+        f"The target region is not symmetric under {_where(group)}: {group.needs}, it is off by {far}; "
+        "packed without symmetry: mend the region, or give another symmetry or symmetry_centre."
     )
