@@ -20,9 +20,9 @@ from typing import Any, NoReturn, Protocol, cast
 
 import numpy as np
 
-from .core.errors import BaseError, OutputError, PatternError
+from .core.errors import BaseError, FieldError, OutputError, PatternError
 from .core.export import make_report, write_features, write_report
-from .core.field_tables import wanted, with_images
+from .core.field_tables import Wanted, wanted, with_images
 from .core.files import LoadedBase, load_base, output_folder, write_mesh
 from .core.mesh import Bools, Floats
 from .core.pattern import Pattern
@@ -30,12 +30,11 @@ from .core.pipeline import pattern_steps
 from .core.progress import Progress, Steps, drive, within
 from .core.recipe import Recipe, default_recipe, load_recipe, recipe_to_toml
 from .core.region import Region, make_region
-from .core.selection import select
+from .core.selection import select, sub_regions
 from .core.sides import check_one_side
 from .core.solid import Part, part_steps
 from .core.soundness import sound_base
 from .core.surroundings import Surroundings
-from .pixels import read_image
 from .terminal import line_on, silenced
 
 EXAMPLE = """\
@@ -73,8 +72,14 @@ class Run:
 class BlenderSide(Protocol):
     """What `blender.batch_base` does for a batch run."""
 
-    def read_base(self, path: Path | None) -> LoadedBase:
-        """The base in a .blend file, in world coordinates; None: in the file that is open."""
+    def read_base(self, path: Path | None, names: Wanted) -> LoadedBase:
+        """The base in a .blend file, in world coordinates, with what `names` asks for; None: in the file that
+        is open.
+        """
+        ...
+
+    def read_image(self, name: str, folder: Path) -> Floats:
+        """The pixels of an image file, or of the open file's image of that name."""
         ...
 
     def write_blend(self, path: Path, run: Run) -> None:
@@ -96,8 +101,10 @@ def run_steps(base: LoadedBase, recipe_file: Path) -> Steps[Run]:
     """
     clock = Clock()
     yield Progress("Reading the region", 0.0)
-    selected = select(base.mesh, load_recipe(recipe_file).region, base.attributes, base.materials)
-    region = make_region(base.mesh, selected)
+    choice = load_recipe(recipe_file).region
+    selected = select(base.mesh, choice, base.attributes, base.materials)
+    parts = sub_regions(choice, base.attributes, base.materials)
+    region = make_region(base.mesh, selected, parts, choice.gap)
     recipe = load_recipe(recipe_file, default_recipe(region.area, region.perimeter))
     sound_base(base.mesh)  # step 3 looks again; but nobody shall wait for a packing to be told of a hole
     if recipe.feature.depth is None:
@@ -114,9 +121,21 @@ def run_steps(base: LoadedBase, recipe_file: Path) -> Steps[Run]:
 
 
 def read_images(recipe: Recipe, folder: Path) -> dict[str, Floats]:
-    """The images that the recipe's fields ask for, by name, seen from `folder`. FieldError: see pixels."""
-    names = wanted(recipe.packing.pitch, recipe.shaping.diameter).images
-    return {name: read_image(name, folder) for name in sorted(names)}
+    """The images that the recipe's fields ask for, by name, seen from `folder`.
+
+    Raises FieldError where one cannot be read, or this Python has no Blender in it.
+    """
+    names = sorted(wanted(recipe.packing.pitch, recipe.shaping.diameter).images)
+    if not names:
+        return {}
+    try:
+        side = blender_side()
+    except OutputError as error:
+        raise FieldError(
+            f'Image "{names[0]}" needs Blender to be read ({error.__cause__}): run this in Blender, with '
+            "`blender -b -P scripts/pattern_batch.py -- ...`"
+        ) from None
+    return {name: side.read_image(name, folder) for name in names}
 
 
 def surroundings_of(base: LoadedBase, images: Mapping[str, Floats]) -> Surroundings:
@@ -197,7 +216,7 @@ def blender_side() -> BlenderSide:
         raise OutputError(
             f"A .blend file or a picture needs Blender ({error}): run this in Blender, with "
             "`blender -b -P scripts/pattern_batch.py -- ...`"
-        ) from None
+        ) from error
     # by name, because the two rooms know each other's types and a checker loses its way in the circle
     return cast(BlenderSide, import_module(".blender.batch_base", __package__))
 
@@ -231,16 +250,16 @@ def parse(arguments: Sequence[str], prog: str) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def read_base(path: Path | None, in_blender: bool) -> LoadedBase:
-    """The base that the command line names; None is the file open in Blender."""
+def read_base(path: Path | None, in_blender: bool, names: Wanted) -> LoadedBase:
+    """The base that the command line names, with what `names` asks for; None is the file open in Blender."""
     if path is None:
         if not in_blender:
             raise BaseError("No base is given: add --base MODEL")
-        return blender_side().read_base(None)
+        return blender_side().read_base(None, names)
     if path.suffix.lower() == ".blend":
         if not path.exists():
             raise BaseError(f"Base {path} does not exist: check the path")
-        return blender_side().read_base(path)
+        return blender_side().read_base(path, names)
     return load_base(path)
 
 
@@ -261,9 +280,10 @@ def main(
     show = None if options.quiet else report or line_on(sys.stderr)
     hushed = silenced if options.quiet else nullcontext  # Blender tells of every file it reads and saves
     try:
-        load_recipe(options.recipe)  # nonsense is told before a long read
+        recipe = load_recipe(options.recipe)  # nonsense is told before a long read
         with hushed():
-            base = read_base(options.base, in_blender)
+            names = wanted(recipe.packing.pitch, recipe.shaping.diameter)
+            base = read_base(options.base, in_blender, names)
         with output_folder(options.out) as folder:
             run = drive(run_steps(base, options.recipe), show)
             with hushed():

@@ -26,7 +26,9 @@ from scipy.spatial import cKDTree
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
+from bubble_pattern_addon.core.blending import Fill
 from bubble_pattern_addon.core.distance import boundary_distance
+from bubble_pattern_addon.core.fields import Linear, Radial
 from bubble_pattern_addon.core.mesh import Floats, Mesh
 from bubble_pattern_addon.core.metric import Constant
 from bubble_pattern_addon.core.pattern import Pattern
@@ -36,6 +38,7 @@ from bubble_pattern_addon.core.quality import Quality, measure, measure_points
 from bubble_pattern_addon.core.recipe import Feature, Packing, Recipe, Shaping
 from bubble_pattern_addon.core.region import Region, make_region
 from bubble_pattern_addon.core.solid import Part, part_steps, plan_steps
+from bubble_pattern_addon.core.soundness import forget_base
 from scripts import peers
 from scripts.shapes import SHAPES, Shape, circle, curved_slab, plate, rectangle_outline, trapezoid_outline
 
@@ -202,9 +205,47 @@ def curved(repeats: int) -> None:
         against(name, shape, shape.pitch, "", None, repeats)
 
 
+GRADED = (
+    ("trapezoid", "linear 2 to 6", Linear(from_=2.0, to=6.0, direction=(1.0, 0.0, 0.0))),
+    ("trapezoid", "radial 1 to 4", Radial(from_=1.0, to=4.0, centre=(-20.0, -10.0, 0.0))),
+    ("panel", "linear 4 to 12", Linear(from_=4.0, to=12.0, direction=(1.0, 0.0, 0.0))),
+    ("panel", "radial 2.5 to 10", Radial(from_=2.5, to=10.0, centre=(-30.0, -20.0, 20.0))),
+)
+
+
+def graded(repeats: int) -> None:
+    """Graded packings, beside uniform ones at the same count on the same region."""
+    print("\n## Packing, graded\n\nFigures are relative to the local pitch; ratio: to uniform at that count.")
+    print_head("| region | pitch | n | seconds | ratio | six | ψ6 | gap CV | gap min | gap mean | rim CV |")
+    for name, words, field in GRADED:
+        shape = SHAPES[name]()
+        region = make_region(shape.mesh, shape.selected)
+        recipe = Recipe(packing=Packing(pitch=field), shaping=Shaping(diameter=Fill(Constant(0.6))))
+        pattern = drive(pattern_steps(region, recipe))
+        even = uniform(float(np.sqrt(region.area / (np.sqrt(0.75) * len(pattern)))))
+        ours, plain = in_turn([partial(packed_in, region, recipe), partial(packed_in, region, even)], repeats)
+        gap = cKDTree(pattern.position).query(pattern.position, 2)[0][:, 1] / pattern.pitch
+        q = measure(pattern, region)
+        print(
+            f"| {name} | {words} | {len(pattern):,} | {ours:.3f} | **{ours / plain:.2f}** | {q.six:.3f} "
+            f"| {q.psi6:.3f} | {q.gap_cv:.3f} | {q.gap_min:.3f} | {gap.mean():.3f} | {q.rim_cv:.4f} |",
+            flush=True,
+        )
+
+
+def packed_in(region: Region, recipe: Recipe) -> float:
+    """Seconds of packing and shaping `recipe` in `region`."""
+    start = time.perf_counter()
+    drive(pattern_steps(region, recipe))
+    return time.perf_counter() - start
+
+
 def adding(repeats: int) -> None:
     """`part_steps` with everything it does against the bare subtraction of the same cutters."""
-    print("\n## Adding\n\n32-sided through-holes; bare: the subtraction alone, both solids built beforehand.")
+    print(
+        "\n## Adding\n\n32-sided through-holes; ours with all checks, of a base not seen before; bare: the "
+        "subtraction alone, both solids built beforehand."
+    )
     print_head("| base | triangles | holes | ours, s | bare, s | ratio | watertight | genus | problems |")
     for name, shape, pitch in adding_cases():
         add(name, shape, pitch, repeats)
@@ -227,6 +268,7 @@ def add(name: str, shape: Shape, pitch: float, repeats: int) -> None:
     parts: list[Part] = []
 
     def ours() -> float:
+        forget_base()
         start = time.perf_counter()
         parts[:] = [drive(part_steps(shape.mesh, pattern, feature))]
         return time.perf_counter() - start
@@ -321,6 +363,7 @@ def installed(module: str) -> bool:
 SECTIONS: dict[str, Callable[[int], None]] = {
     "flat": flat,
     "curved": curved,
+    "graded": graded,
     "adding": adding,
     "blender": blender,
 }

@@ -20,18 +20,16 @@ import argparse
 import os
 import sys
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from scripts import environment  # noqa: E402
-from scripts.progress_bar import progress_bar  # noqa: E402
+from scripts.progress_bar import follow_rendering, progress_bar  # noqa: E402
 
 if TYPE_CHECKING:
-    from bubble_pattern_addon.core.progress import Progress
     from scripts.door_panel import DoorPanel
 
 RECIPE = """\
@@ -51,6 +49,9 @@ min_web = 0.6
 blend = true
 picture = {picture}
 """
+MOULDED = {"color": (0.018, 0.019, 0.021), "roughness": 0.42, "grain": 0.04, "grain_size": 0.5}
+GRILLE = {"color": (0.20, 0.208, 0.224), "metallic": 0.75, "roughness": 0.42}
+BADGE = {"color": (0.62, 0.63, 0.65), "metallic": 1.0, "roughness": 0.22}
 FILES = {
     "pattern.blend": "opens with the pattern editable",
     "part.stl": "the part",
@@ -72,54 +73,24 @@ def parse() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def write_base(path: Path, panel: DoorPanel) -> None:
-    """The panel as a .blend in millimetres: materials, smooth shading, the target region marked."""
-    import bpy
+def write_panel(path: Path, panel: DoorPanel) -> None:
+    """The panel as a .blend with the target region marked."""
     import numpy as np
 
-    from bubble_pattern_addon.blender.batch_base import new_file_in_millimeters
-    from bubble_pattern_addon.blender.picture import make_material
+    from scripts.base_file import write_base
 
-    new_file_in_millimeters()
-    mesh = bpy.data.meshes.new("Door panel")
-    mesh.from_pydata(panel.mesh.vertices.tolist(), [], panel.mesh.triangles.tolist())
-    mesh.shade_smooth()
-    mesh.set_sharp_from_angle(angle=np.radians(50))
-    mesh.materials.append(
-        make_material("Moulded plastic", (0.018, 0.019, 0.021), roughness=0.42, grain=0.04, grain_size=0.5)
+    everywhere = np.ones(len(panel.region), dtype=bool)
+    write_base(
+        path,
+        "Door panel",
+        panel.mesh,
+        {"bubble_region": panel.region},
+        {
+            "Moulded plastic": (MOULDED, everywhere),
+            "Grille": (GRILLE, panel.region),
+            "Badge": (BADGE, panel.island),
+        },
     )
-    mesh.materials.append(make_material("Grille", (0.20, 0.208, 0.224), metallic=0.75, roughness=0.42))
-    mesh.materials.append(make_material("Badge", (0.62, 0.63, 0.65), metallic=1.0, roughness=0.22))
-    material = np.where(panel.island, 2, panel.region).astype(np.int32)
-    mesh.polygons.foreach_set("material_index", material)
-    attribute = mesh.attributes.new("bubble_region", 'BOOLEAN', 'FACE')
-    attribute.data.foreach_set("value", panel.region)
-    mesh.update()
-    obj = bpy.data.objects.new("Door panel", mesh)
-    bpy.context.scene.collection.objects.link(obj)
-    bpy.context.view_layer.objects.active = obj
-    bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True)
-
-
-def shown() -> Callable[[Progress], None]:
-    """A reporter that follows the batch run, and the samples of the rendering."""
-    import re
-
-    import bpy
-
-    from bubble_pattern_addon.core.progress import Progress
-    from bubble_pattern_addon.terminal import line_on
-
-    show = progress_bar() or line_on(sys.stderr)
-
-    @bpy.app.handlers.persistent  # it shall outlive the files that are opened
-    def rendering(stats: Any, *_: Any) -> None:
-        sample = re.search(r"Sample (\d+)/(\d+)", str(stats))
-        if sample:
-            show(Progress("Rendering", int(sample[1]) / int(sample[2])))
-
-    bpy.app.handlers.render_stats.append(rendering)
-    return show
 
 
 def main() -> int:
@@ -136,11 +107,11 @@ def make(options: argparse.Namespace) -> int:
     """The demo itself, inside the environment."""
     from bubble_pattern_addon import batch
     from bubble_pattern_addon.core.progress import Progress
-    from bubble_pattern_addon.terminal import silenced
+    from bubble_pattern_addon.terminal import line_on, silenced
     from scripts.door_panel import make_door_panel
 
     out: Path = options.out.resolve()
-    show = shown()
+    show = progress_bar() or line_on(sys.stderr)
     show(Progress("Modelling the panel", 0.0))
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -154,10 +125,10 @@ def make(options: argparse.Namespace) -> int:
             encoding="utf-8",
         )
         with silenced():
-            write_base(out / "door_panel.blend", make_door_panel())
+            write_panel(out / "door_panel.blend", make_door_panel())
     except OSError as error:
         sys.exit(f"demo.py: {out} can't be written ({error.strerror}): give another folder with --out")
-    with silenced():
+    with silenced(), follow_rendering(show):
         code = batch.main(
             [str(recipe), "--base", str(out / "door_panel.blend"), "--out", str(out)], "demo.py", show
         )

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import Delaunay, cKDTree
 
 from bubble_pattern_addon.core.mesh import Bools, Floats, Ints, Mesh
-from scripts.shapes import doubled_areas
+from scripts.moulding import counter_clockwise, smooth, vertex_normals
 
 THICKNESS = 2.5
 CORNERS = np.array([[-84.0, -50.0], [78.0, -46.0], [88.0, 38.0], [-62.0, 52.0]])
@@ -46,12 +46,12 @@ def make_door_panel() -> DoorPanel:
     # along the straight sides rounding makes slivers out of three points of the outermost ring
     triangles = triangles[~np.isin(triangles, edge).all(axis=1)]
     middle = flat[triangles].mean(axis=1)
-    triangles = _counter_clockwise(flat, triangles)
+    triangles = counter_clockwise(flat, triangles)
     on_island = np.linalg.norm(middle - ISLAND, axis=1) < ISLAND_RADIUS
     # a triangle lies inside the outline when all its corners do
     inside = (offset[triangles] <= 1e-9).all(axis=1)
     top = _in_space(flat, offset)
-    bottom = top - THICKNESS * _vertex_normals(top, triangles)
+    bottom = top - THICKNESS * vertex_normals(top, triangles)
     count = len(top)
     following = np.roll(edge, -1)
     wall = np.concatenate(
@@ -131,18 +131,6 @@ def _fill(line: Floats, normal: Floats) -> Floats:
     return grid[(depth > 3 + 0.6 * FILL) & clear]
 
 
-def _counter_clockwise(flat: Floats, triangles: Ints) -> Ints:
-    turned = doubled_areas(flat, triangles) < 0
-    triangles[turned] = triangles[turned][:, ::-1]
-    return triangles
-
-
-def _smooth(x: Floats) -> Floats:
-    """From 0 at x <= 0 to 1 at x >= 1, with flat ends and flat curvature there (Perlin's quintic)."""
-    x = np.clip(x, 0, 1)
-    return x**3 * (10 - 15 * x + 6 * x**2)
-
-
 def _in_space(flat: Floats, offset: Floats) -> Floats:
     """The visible surface over the unrolled plane: crown, bead round the region, island, bend and flange."""
     arc = np.clip((offset - RIM_WIDTH) / FILLET, 0, np.pi / 2)
@@ -151,12 +139,10 @@ def _in_space(flat: Floats, offset: Floats) -> Floats:
     shrink = np.where(beyond > 0, FILLET * np.sin(arc) + 0.05 * down - beyond, 0)  # flange with draft
     x, y = (flat + shrink[:, None] * _outward(flat)).T
     crown = -(x**2) / (2 * 400) - y**2 / (2 * 260) - 0.0004 * x * y
-    bead = 2.6 * _smooth((offset - 0.4) / 6.5) - 1.0 * _smooth((offset - 8.5) / 11)
+    bead = 2.6 * smooth((offset - 0.4) / 6.5) - 1.0 * smooth((offset - 8.5) / 11)
     r = np.linalg.norm(flat - ISLAND, axis=1)
     # gentle enough to be offset by the thickness: the quintic's sharpest radius is width^2 / (5.8 height)
-    cap = (
-        1.9 * _smooth((ISLAND_RADIUS - r) / 5.5) - 1.0 * _smooth((13 - r) / 4.5) + 0.4 * _smooth((8 - r) / 8)
-    )
+    cap = 1.9 * smooth((ISLAND_RADIUS - r) / 5.5) - 1.0 * smooth((13 - r) / 4.5) + 0.4 * smooth((8 - r) / 8)
     z = crown + bead + cap - FILLET * (1 - np.cos(arc)) - down
     return np.stack([x, y, z], axis=1)
 
@@ -164,12 +150,3 @@ def _in_space(flat: Floats, offset: Floats) -> Floats:
 def _outward(flat: Floats) -> Floats:
     line, normal = outline()
     return normal[cKDTree(line).query(flat)[1]]
-
-
-def _vertex_normals(vertices: Floats, triangles: Ints) -> Floats:
-    """Unit normals at the vertices, triangles weighted by area."""
-    vectors = Mesh(vertices, triangles).area_vectors
-    summed = np.zeros_like(vertices)
-    for corner in range(3):
-        np.add.at(summed, triangles[:, corner], vectors)
-    return summed / np.linalg.norm(summed, axis=1, keepdims=True)

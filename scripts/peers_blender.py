@@ -23,6 +23,7 @@ from bubble_pattern_addon.core.pattern import Pattern
 from bubble_pattern_addon.core.progress import drive
 from bubble_pattern_addon.core.recipe import Feature
 from bubble_pattern_addon.core.solid import part_steps
+from bubble_pattern_addon.core.soundness import forget_base
 
 
 def version() -> str:
@@ -56,7 +57,8 @@ def read(base_object: Any) -> Base:
 
 
 def ours(base_object: Any, pattern: Pattern, feature: Feature) -> tuple[float, int]:
-    """Seconds from the object to the part's mesh as the add-on makes it, and the part's number of faces."""
+    """Seconds from the object, not seen before, to the part's mesh as the add-on makes it; its faces."""
+    forget_base()
     start = time.perf_counter()
     with evaluated_mesh(base_object, bpy.context.evaluated_depsgraph_get()) as mesh:
         base, original = read_base(base_object, mesh), read_original(base_object, mesh)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib.util import find_spec
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from bubble_pattern_addon.core.progress import Progress
@@ -28,3 +29,25 @@ def progress_bar() -> Callable[[Progress], None] | None:
         bar.refresh()
 
     return show
+
+
+@contextmanager
+def follow_rendering(show: Callable[[Progress], None]) -> Iterator[None]:
+    """Tell `show` of the samples of all pictures that Blender renders meanwhile."""
+    import re
+
+    import bpy
+
+    from bubble_pattern_addon.core.progress import Progress
+
+    @bpy.app.handlers.persistent  # it shall outlive the files that are opened
+    def rendering(stats: Any, *_: Any) -> None:
+        sample = re.search(r"Sample (\d+)/(\d+)", str(stats))
+        if sample:
+            show(Progress("Rendering", int(sample[1]) / int(sample[2])))
+
+    bpy.app.handlers.render_stats.append(rendering)
+    try:
+        yield
+    finally:
+        bpy.app.handlers.render_stats.remove(rendering)

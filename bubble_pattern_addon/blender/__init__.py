@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from . import command, operators, panels, properties, versioning
+from . import command, fixed_sizes, operators, panels, properties, versioning
 
-MODULES = (properties, operators, panels, versioning, command)
+MODULES = (properties, operators, fixed_sizes, panels, versioning, command)
 
 
 def register() -> None:

@@ -17,22 +17,29 @@ import bpy
 import numpy as np
 
 from ..core.errors import BaseError, OutputError
+from ..core.field_tables import Wanted, wanted, with_images
 from ..core.files import LoadedBase
 from ..core.mesh import Bools, Floats, Mesh
 from ..core.metric import Places
+from ..core.moving import moved_recipe
 from ..core.pattern import Pattern
 from ..core.quality import measure
+from ..core.recipe import Recipe
+from .applying import place_part, verdict_of
 from .attributes import CORNER_VERTEX, MATERIAL, write_values
-from .generation import fill_settings, measured, place_part, put, read_source, verdict_of
+from .generation import fill_settings, measured, put, read_source
 from .marked_side import on_marked_side
 from .part_mesh import build_part_mesh
 from .pattern_object import new_pattern_object
-from .picture import render_part
+from .picture import SIZE, render_part
+from .pixels import load_image
+from .pixels import read_image as read_image
 from .properties import is_pattern, recipe_of
 from .provenance import Original, read_original
-from .reading import Base, evaluated_mesh, transformed
+from .reading import Base, evaluated_mesh, transformed, world_frame
 from .reading import read_base as read_object
-from .target_region import ATTRIBUTE, store
+from .surroundings import read_painted, with_things
+from .target_region import ATTRIBUTE, store, stored
 
 if TYPE_CHECKING:
     from ..batch import Run
@@ -67,8 +74,9 @@ def registered() -> Iterator[None]:
 # -- in ------------------------------------------------------------------------------------------------------
 
 
-def read_base(path: Path | None) -> LoadedBase:
-    """The base in a .blend file, with its modifiers and in world coordinates; None: in the file that is open.
+def read_base(path: Path | None, names: Wanted) -> LoadedBase:
+    """The base in a .blend file, with its modifiers and in world coordinates, and of what is painted on it or
+    stands beside it what `names` asks for; None: in the file that is open.
 
     Raises BaseError where the file is no .blend, or which of its objects is meant cannot be told.
     """
@@ -82,8 +90,18 @@ def read_base(path: Path | None) -> LoadedBase:
         obj = base_object()
         with evaluated_mesh(obj, bpy.context.evaluated_depsgraph_get()) as mesh:
             base = read_object(obj, mesh, WORLD)
+            painted = read_painted(obj, mesh, base, replace(names, images=frozenset()))
+        around = with_things(painted, names, WORLD, bpy.context)
         marks = {name: on_marked_side(obj, base, name, mask) for name, mask in base.attributes.items()}
-    return BlendBase(base.mesh, marks, base.materials, obj.name)
+    return BlendBase(
+        base.mesh,
+        marks,
+        base.materials,
+        obj.name,
+        values=around.attributes,
+        uv_maps=around.uv_maps,
+        objects=around.objects,
+    )
 
 
 def base_object() -> bpy.types.Object:
@@ -115,16 +133,20 @@ def write_blend(path: Path, run: Run) -> None:
     with registered():
         base_obj, base, original = stand_base(run)
         region = run.recipe.region.attribute or ATTRIBUTE
+        if region in base_obj.data.attributes and stored(base_obj, region) is None:
+            region = ATTRIBUTE  # what the recipe names is no mark on faces
         if region not in base_obj.data.attributes:
             mark(base_obj, region, base, run.selected)
-        source = read_source(base_obj, region, bpy.context)
         pattern_obj = new_pattern_object(base_obj)
-        fill_settings(pattern_obj, base_obj, region, run.recipe)
+        to_frame = np.linalg.inv(world_frame(base_obj))
+        fill_settings(pattern_obj, base_obj, region, moved_recipe(with_images_in(run), to_frame, run.region))
+        recipe = recipe_of(pattern_obj.bubble_pattern)
+        source = read_source(base_obj, region, bpy.context, recipe)
         start = time.perf_counter()
-        own = moved(run.pattern, np.linalg.inv(source.base.frame))
+        own = moved(run.pattern, to_frame)
         laid = measured(own, source.region, measure(own, source.region), start)
         laid = replace(laid, seconds=run.report["seconds"]["pack"])
-        put(pattern_obj, source, recipe_of(pattern_obj.bubble_pattern), laid)
+        put(pattern_obj, source, recipe, laid)
         mesh = build_part_mesh(f"{base_obj.name} Part", run.part, run.pattern.places, base, original)
         place_part(base_obj, [pattern_obj], mesh, verdict_of(run.part), bpy.context)
         try:
@@ -133,12 +155,33 @@ def write_blend(path: Path, run: Run) -> None:
             raise OutputError(f"{path.name} can't be written: {str(error).removeprefix('Error: ')}") from None
 
 
-def write_picture(path: Path, run: Run) -> None:
-    """A rendered view of the part as PNG, looking at the pattern. Raises OutputError where that fails."""
+def with_images_in(run: Run) -> Recipe:
+    """The recipe with the image files that it names taken into the open file, under names that fit there."""
+    packing, shaping = run.recipe.packing, run.recipe.shaping
+    names: dict[str, str] = {}
+    for name in sorted(wanted(packing.pitch, shaping.diameter).images):
+        if (run.origin / name).is_file():
+            image = load_image(run.origin / name)
+            image.name = Path(name).name
+            image.pack()
+            image.use_fake_user = True  # a field that is kept as text does not hold it
+            names[name] = image.name
+    return replace(
+        run.recipe,
+        packing=replace(packing, pitch=with_images(packing.pitch, names)),
+        shaping=replace(shaping, diameter=with_images(shaping.diameter, names)),
+    )
+
+
+def write_picture(path: Path, run: Run, size: tuple[int, int] = SIZE, up: Floats | None = None) -> None:
+    """A rendered view of the part as PNG, looking at the pattern. Raises OutputError where that fails.
+
+    size, up: see render_part
+    """
     with registered():
         base_obj, base, original = stand_base(run)
         mesh = build_part_mesh(f"{base_obj.name} Part", run.part, run.pattern.places, base, original)
-        render_part(path, mesh, np.array(base_obj.matrix_world), run.pattern)
+        render_part(path, mesh, np.array(base_obj.matrix_world), run.pattern, size, up)
 
 
 def stand_base(run: Run) -> tuple[bpy.types.Object, Base, Original]:
@@ -166,6 +209,7 @@ def new_file_with(base: LoadedBase) -> bpy.types.Object:
     bpy.context.scene.collection.objects.link(obj)
     for name, mask in base.attributes.items():
         write_values(obj.data, name, 'FACE', 'BOOLEAN', mask)
+    write_painted(obj.data, base)
     index = np.zeros(len(base.mesh.triangles), dtype=np.int32)
     for row, (name, mask) in enumerate(base.materials.items()):
         obj.data.materials.append(bpy.data.materials.new(name))
@@ -173,6 +217,28 @@ def new_file_with(base: LoadedBase) -> bpy.types.Object:
     write_values(obj.data, MATERIAL, 'FACE', 'INT', index)
     bpy.context.view_layer.update()
     return obj
+
+
+def write_painted(mesh: bpy.types.Mesh, base: LoadedBase) -> None:
+    """Give the mesh what is painted on `base`: numbers, colours and UV maps. Masks of faces stay masks."""
+    for name, values in base.values.items():
+        if values.ndim == 1:
+            if not np.isin(values, (0.0, 1.0)).all():
+                write_values(mesh, name, 'FACE', 'FLOAT', values)
+        elif values.ndim == 2:
+            write_values(mesh, name, 'CORNER', 'FLOAT', values.reshape(-1))
+        else:
+            colours = np.ones((values.shape[0] * 3, 4))
+            flat = values.reshape(-1, values.shape[2])
+            # one channel is grey, two are grey and alpha
+            colours[:, :3] = flat[:, :3] if flat.shape[1] > 2 else flat[:, :1]
+            if flat.shape[1] in (2, 4):
+                colours[:, 3] = flat[:, -1]
+            write_values(mesh, name, 'CORNER', 'FLOAT_COLOR', colours)
+    for name, uv in base.uv_maps.items():
+        mesh.uv_layers.new(name=name, do_init=False).uv.foreach_set(
+            "vector", np.ascontiguousarray(uv, dtype=np.float32).ravel()
+        )
 
 
 def mesh_of(base: Mesh) -> bpy.types.Mesh:
@@ -215,4 +281,5 @@ def moved(pattern: Pattern, matrix: Floats) -> Pattern:
         places=Places(transformed(places.position, matrix), places.triangle, places.barycentric),
         normal=pattern.normal @ turn,
         tangent=pattern.tangent @ turn,
+        dropped=None if pattern.dropped is None else moved(pattern.dropped, matrix),
     )

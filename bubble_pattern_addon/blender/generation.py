@@ -8,17 +8,15 @@ so a cancelled or failed run leaves nothing behind.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import bpy
 import numpy as np
 
-from ..core.errors import BaseError, PatternError, RegionError
+from ..core.errors import PatternError
+from ..core.field_tables import Wanted, wanted
 from ..core.mesh import Bools
-from ..core.metric import Places
 from ..core.pattern import Pattern
 from ..core.pipeline import pattern_steps
 from ..core.progress import Progress, Steps, drive
@@ -26,16 +24,14 @@ from ..core.quality import Quality, measure, min_margin, min_web, open_area
 from ..core.recipe import Recipe, RegionChoice, default_recipe, recipe_from_dict
 from ..core.region import Region, make_region
 from ..core.selection import select
-from ..core.sides import check_one_side
-from ..core.solid import Part, part_steps
+from ..core.shaping import reshaped
+from ..core.surroundings import Surroundings
 from .marked_side import on_marked_side
-from .part_mesh import build_part_mesh
-from .pattern_object import read_pattern, write_diameters, write_pattern
+from .pattern_object import read_pattern, write_pattern, write_sizes
 from .preview_nodes import show_preview
 from .properties import (
     SETTINGS_VERSION,
     in_scene,
-    is_outdated,
     packing_text,
     pattern_objects,
     recipe_of,
@@ -43,8 +39,8 @@ from .properties import (
     spoken,
     take_recipe,
 )
-from .provenance import Original, read_original
-from .reading import Base, evaluated_mesh, read_base
+from .reading import Base, evaluated_mesh, read_base, shown
+from .surroundings import both, read_painted, trace, with_things
 
 # A pattern that took longer than this is not laid anew at every change of a setting.
 LIVE_SECONDS = 1.0
@@ -64,48 +60,47 @@ class Laid:
 
 @dataclass(frozen=True)
 class Source:
-    """A base as read for one pattern: geometry, region, the region's triangles as a mask (T,), and what tells
-    whether any of them has changed.
+    """A base as read for one pattern: geometry, region, the region's triangles as a mask (T,), what fields
+    ask for, and what tells whether any of them has changed: for the bubbles' places, and for their sizes.
     """
 
     base: Base
     region: Region
     selected: Bools
+    surroundings: Surroundings
     fingerprint: str
+    size_trace: str
 
 
-@contextmanager
-def shown(obj: bpy.types.Object, context: bpy.types.Context) -> Iterator[None]:
-    """Let `obj` be visible for a while: Blender does not run the modifiers of hidden objects."""
-    if obj.name not in context.view_layer.objects:
-        raise BaseError(f'"{obj.name}" is not in this view layer: include its collection')
-    was_hidden, was_disabled = obj.hide_get(), obj.hide_viewport
-    if not was_hidden and not was_disabled:
-        yield
-        return
-    obj.hide_set(False)
-    obj.hide_viewport = False
-    try:
-        yield
-    finally:
-        obj.hide_set(was_hidden)
-        obj.hide_viewport = was_disabled
-
-
-def read_source(obj: bpy.types.Object, attribute: str, context: bpy.types.Context) -> Source:
-    """Read the base `obj` with its modifiers, and its target region from the face attribute of that name.
+def read_source(
+    obj: bpy.types.Object, attribute: str, context: bpy.types.Context, recipe: Recipe | None = None
+) -> Source:
+    """Read the base `obj` with its modifiers, its target region from the face attribute of that name, and
+    what the fields of `recipe` ask for.
 
     Raises RegionError where no face carries the attribute, BaseError where the object has no usable mesh.
     """
+    pitch_names, size_names = (Wanted(), Wanted()) if recipe is None else names_of(recipe)
+    names = both(pitch_names, size_names)
     with shown(obj, context), evaluated_mesh(obj, context.evaluated_depsgraph_get()) as mesh:
         base = read_base(obj, mesh)
+        painted = read_painted(obj, mesh, base, names)
+    surroundings = with_things(painted, names, base.frame, context)
     selected = select(base.mesh, RegionChoice(attribute=attribute), base.attributes)
-    return source_of(base, on_marked_side(obj, base, attribute, selected))
+    selected = on_marked_side(obj, base, attribute, selected)
+    return Source(
+        base,
+        make_region(base.mesh, selected),
+        selected,
+        surroundings,
+        base.fingerprint(selected) + trace(surroundings, pitch_names),
+        trace(surroundings, size_names),
+    )
 
 
-def source_of(base: Base, selected: Bools) -> Source:
-    """The source of a pattern on the triangles `selected` (T,) of `base`."""
-    return Source(base, make_region(base.mesh, selected), selected, base.fingerprint(selected))
+def names_of(recipe: Recipe) -> tuple[Wanted, Wanted]:
+    """What the packing metric asks its surroundings for, and what the shaping metric does."""
+    return wanted(recipe.packing.pitch), wanted(recipe.shaping.diameter)
 
 
 def fitting_recipe(
@@ -128,7 +123,7 @@ def fitting_recipe(
 def laying_steps(source: Source, recipe: Recipe) -> Steps[Laid]:
     """Steps 1 and 2 and their figures."""
     start = time.perf_counter()
-    pattern = yield from pattern_steps(source.region, recipe)
+    pattern = yield from pattern_steps(source.region, recipe, source.surroundings)
     yield Progress("Measuring", 1.0)
     return measured(pattern, source.region, measure(pattern, source.region), start)
 
@@ -154,9 +149,13 @@ def note(settings: Any, source: Source, recipe: Recipe, laid: Laid) -> None:
     """Write down what the points were made with, and the figures that depend on the features' sizes."""
     settings.made_with = recipe_text(recipe)
     settings.fingerprint = source.fingerprint
+    settings.size_trace = source.size_trace
     settings.version = SETTINGS_VERSION
     settings.trouble = ""
     settings.count = len(laid.pattern)
+    settings.shrunk = len(laid.pattern.shrunk)
+    settings.dropped = 0 if laid.pattern.dropped is None else len(laid.pattern.dropped)
+    settings.notes = " ".join(laid.pattern.notes)
     settings.web = laid.web if np.isfinite(laid.web) else -1.0
     settings.margin = laid.margin if np.isfinite(laid.margin) else -1.0
     settings.open_area = laid.open_area
@@ -167,7 +166,7 @@ def update_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[Non
     settings = obj.bubble_pattern
     recipe = recipe_of(settings)
     yield Progress("Reading the base", 0.0)
-    source = read_source(settings.base, settings.region, context)
+    source = read_source(settings.base, settings.region, context, recipe)
     laid = yield from laying_steps(source, recipe)
     put(obj, source, recipe, laid)
 
@@ -181,7 +180,7 @@ def react(settings: Any, context: bpy.types.Context, repack: bool) -> None:
     if (
         not settings.live
         or not in_scene(settings.base)
-        or settings.base.mode == 'EDIT'
+        or 'EDIT' in (settings.base.mode, obj.mode)
         or not settings.made_with
     ):
         return
@@ -204,119 +203,15 @@ def reshape(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     settings = obj.bubble_pattern
     recipe = recipe_of(settings)
     start = time.perf_counter()
-    source = read_source(settings.base, settings.region, context)
+    source = read_source(settings.base, settings.region, context, recipe)
     if source.fingerprint != settings.fingerprint:
         drive(update_steps(obj, context))
         return
-    pattern = read_pattern(obj, source.base.mesh)
-    pattern = replace(pattern, diameter=recipe.shaping.diameter(pattern.places))
+    pattern = reshaped(read_pattern(obj, source.base.mesh), source.region, recipe, source.surroundings)
     quality = Quality(settings.six, 0.0, 0.0, settings.gap_min, 0.0)
     laid = measured(pattern, source.region, quality, start)
-    write_diameters(obj, pattern.diameter)
+    write_sizes(obj, pattern)
     note(settings, source, recipe, laid)
-
-
-# -- the part ----------------------------------------------------------------------------------------------
-
-
-def joined(patterns: list[Pattern]) -> Pattern:
-    """Several patterns on one base as one; ids go on from one to the next."""
-    if len(patterns) == 1:
-        return patterns[0]
-
-    def all_of(values: list[Any]) -> Any:
-        """A column of every pattern, (n,) or (n, w) each, one after the other."""
-        return np.concatenate(values)
-
-    places = [pattern.places for pattern in patterns]
-    return Pattern(
-        Places(
-            all_of([p.position for p in places]),
-            all_of([p.triangle for p in places]),
-            all_of([p.barycentric for p in places]),
-        ),
-        normal=all_of([p.normal for p in patterns]),
-        tangent=all_of([p.tangent for p in patterns]),
-        pitch=all_of([p.pitch for p in patterns]),
-        diameter=all_of([p.diameter for p in patterns]),
-        row=all_of([p.row for p in patterns]),
-    )
-
-
-def apply_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[tuple[bpy.types.Object, Part]]:
-    """Make the part: the base with the features of all its patterns, as an object in the base's place.
-
-    A pattern whose settings or base have changed since is laid anew first.
-
-    Raises PatternError, BaseError where the base is not fit for a solid.
-    """
-    settings = obj.bubble_pattern
-    base_object = settings.base
-    owners = pattern_objects(base_object)
-    feature = recipe_of(settings).feature
-    if any(recipe_of(owner.bubble_pattern).feature != feature for owner in owners):
-        raise PatternError(
-            f'The patterns on "{base_object.name}" have holes of different kinds: give them the same depth '
-            "and sides, or apply one, and add the other to the part"
-        )
-    for owner in owners:
-        source = read_source(base_object, owner.bubble_pattern.region, context)
-        if feature.depth is None:
-            check_one_side(source.base.mesh, source.selected)
-        if source.fingerprint != owner.bubble_pattern.fingerprint or is_outdated(owner.bubble_pattern):
-            yield from update_steps(owner, context)
-    base, original = read_whole(base_object, context)
-    pattern = joined([read_pattern(owner, base.mesh) for owner in owners])
-    if not len(pattern):
-        raise RegionError("The pattern has no features: make the pitch smaller or the region larger")
-    part = yield from part_steps(base.mesh, pattern, feature)
-    yield Progress("Building the part", 1.0)
-    mesh = build_part_mesh(
-        f"{base_object.name} Part", part, pattern.places, base, original, settings.wall_material
-    )
-    return place_part(base_object, owners, mesh, verdict_of(part), context), part
-
-
-def read_whole(obj: bpy.types.Object, context: bpy.types.Context) -> tuple[Base, Original]:
-    """The base `obj` with its modifiers, and all that a part of it inherits."""
-    with shown(obj, context), evaluated_mesh(obj, context.evaluated_depsgraph_get()) as mesh:
-        return read_base(obj, mesh), read_original(obj, mesh)
-
-
-def verdict_of(part: Part) -> str:
-    """What the check of the part found, in a few words for the panel."""
-    return " ".join(part.check.problems)
-
-
-def place_part(
-    base: bpy.types.Object,
-    owners: list[bpy.types.Object],
-    mesh: bpy.types.Mesh,
-    verdict: str,
-    context: bpy.types.Context,
-) -> bpy.types.Object:
-    """Let the object of the part stand where the base is, with this mesh; base and patterns are hidden."""
-    part = owners[0].bubble_pattern.part
-    if in_scene(part) and part.type == 'MESH':
-        old, part.data = part.data, mesh
-        if not old.users:
-            name = old.name
-            bpy.data.meshes.remove(old)
-            mesh.name = name
-    else:
-        part = bpy.data.objects.new(f"{base.name} Part", mesh)
-        for collection in base.users_collection:
-            collection.objects.link(part)
-    part.parent, part.parent_type, part.parent_bone = base.parent, base.parent_type, base.parent_bone
-    part.matrix_parent_inverse = base.matrix_parent_inverse
-    context.view_layer.update()
-    part.matrix_world = base.matrix_world
-    part.bubble_pattern.pattern = owners[0]
-    for owner in owners:
-        owner.bubble_pattern.part = part
-        owner.bubble_pattern.verdict = verdict
-    show_part(owners[0], context, True)
-    return part
 
 
 def show_part(obj: bpy.types.Object, context: bpy.types.Context, applied: bool) -> None:

@@ -12,7 +12,8 @@ import bpy
 from bpy.props import BoolProperty, FloatProperty
 
 from ..core.progress import Progress, Steps
-from .properties import in_scene, is_pattern, length_property, pattern_objects, pattern_of, recipe_of, typed
+from .field_properties import length_property, typed
+from .properties import in_scene, is_pattern, pattern_objects, pattern_of, recipe_of
 from .stepping import SteppedOperator
 from .target_region import free_name, selected_faces, store, stored, trying_region, wanted_faces
 
@@ -173,10 +174,10 @@ class BUBBLE_PATTERN_OT_apply(OnPattern, SteppedOperator, bpy.types.Operator):
     bl_options = {'REGISTER', 'UNDO'}
 
     def steps(self, context: bpy.types.Context) -> Steps[Any]:
-        from . import generation
+        from . import applying
 
         yield Progress("Reading the base", 0.0)
-        result = yield from generation.apply_steps(current_pattern(context), context)
+        result = yield from applying.apply_steps(current_pattern(context), context)
         return result
 
     def done(self, context: bpy.types.Context, result: Any) -> None:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import bpy
 
+from .field_panels import draw_field
 from .properties import in_scene, is_outdated, is_pattern, length_text, pattern_objects, pattern_of
 
 
@@ -160,7 +161,16 @@ class BUBBLE_PATTERN_PT_packing(SettingsPanel, bpy.types.Panel):
 
     bl_label = "Packing"
     bl_order = 1
-    fields = ("pitch", "edge_offset", "seed")
+
+    def draw(self, context: bpy.types.Context) -> None:
+        settings = shown_settings(context)
+        column = columns(self.layout)
+        draw_field(column, settings, "pitch", "pitch_field", False, "Pitch")
+        column.prop(settings, "edge_offset")
+        column.prop(settings, "orientation")
+        if settings.orientation == 'GIVEN':
+            column.prop(settings, "rows_along", text=" ")
+        column.prop(settings, "seed")
 
 
 class BUBBLE_PATTERN_PT_solver(SettingsPanel, bpy.types.Panel):
@@ -181,11 +191,20 @@ class BUBBLE_PATTERN_PT_holes(SettingsPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         settings = shown_settings(context)
         column = columns(self.layout)
-        column.prop(settings, "diameter")
+        share = settings.diameter_mode == 'SHARE'
+        draw_field(column, settings, "fill" if share else "diameter", "diameter_field", share, "Diameter")
+        column.row().prop(settings, "diameter_mode", text=" ", expand=True)
+        row = column.row(align=True)
+        row.operator("bubble_pattern.fix_sizes", icon='PINNED')
+        row.operator("bubble_pattern.free_sizes", icon='UNPINNED')
+        if settings.seeds:
+            column.label(text=f"{len(settings.seeds):,} fixed", icon='PINNED')
+            column.prop(settings, "solver")
         column.row().prop(settings, "depth_mode", expand=True)
         if settings.depth_mode == 'BLIND':
             column.prop(settings, "depth", text=" ")
         column.prop(settings, "sides", text="Sides (0 = Auto)")
+        column.prop(settings, "facet_tolerance")
         column.prop(settings, "wall_material")
 
 
@@ -195,7 +214,7 @@ class BUBBLE_PATTERN_PT_limits(SettingsPanel, bpy.types.Panel):
     bl_label = "Limits"
     bl_order = 3
     bl_options = {'DEFAULT_CLOSED'}
-    fields = ("min_web", "min_margin")
+    fields = ("min_web", "min_margin", "min_diameter")
 
 
 class BUBBLE_PATTERN_PT_preview(SettingsPanel, bpy.types.Panel):
@@ -217,6 +236,9 @@ class BUBBLE_PATTERN_PT_result(SettingsPanel, bpy.types.Panel):
         settings = shown_settings(context)
         self.layout.active = not is_outdated(settings)
         figures: list[tuple[str, str, bool]] = [("Features", f"{settings.count:,}", settings.count == 0)]
+        for name, count in (("Made Smaller", settings.shrunk), ("Left Out", settings.dropped)):
+            if count:
+                figures.append((name, f"{count:,}", False))
         if settings.count > 1:
             figures.append(
                 ("Smallest Web", length_text(context, settings.web), settings.web < settings.min_web)
@@ -238,6 +260,8 @@ class BUBBLE_PATTERN_PT_result(SettingsPanel, bpy.types.Panel):
             right = split.row()
             right.alert = alert
             right.label(text=figure)
+        if settings.notes:
+            sentences(self.layout, settings.notes, context.region.width, 'INFO')
 
 
 CLASSES: tuple[Any, ...] = (

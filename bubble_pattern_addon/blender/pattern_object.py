@@ -6,9 +6,9 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..core.mesh import Floats, Mesh
+from ..core.mesh import Floats, Ints, Mesh
 from ..core.metric import Places
-from ..core.pattern import Pattern
+from ..core.pattern import Pattern, all_bubbles, split
 from .attributes import read_values, write_values
 from .reading import Base
 
@@ -24,56 +24,74 @@ def new_pattern_object(base: bpy.types.Object) -> bpy.types.Object:
 
 
 def write_pattern(obj: bpy.types.Object, pattern: Pattern, base_object: bpy.types.Object, base: Base) -> None:
-    """Fill the pattern object with the features of `pattern`, and set it in its frame on the base."""
+    """Fill the pattern object with all bubbles of `pattern`, and set it in its frame on the base.
+
+    A bubble whose feature was left out is a point with the diameter 0: a later shaping may bring it back.
+    """
+    bubbles = all_bubbles(pattern)
     mesh = obj.data
     mesh.clear_geometry()
-    mesh.vertices.add(len(pattern))
-    write_values(mesh, "position", 'POINT', 'FLOAT_VECTOR', pattern.position)
-    write_values(mesh, "id", 'POINT', 'INT', np.arange(len(pattern)))
-    write_values(mesh, "diameter", 'POINT', 'FLOAT', pattern.diameter)
-    write_values(mesh, "pitch", 'POINT', 'FLOAT', pattern.pitch)
-    write_values(mesh, "row", 'POINT', 'INT', pattern.row)
-    write_values(mesh, "normal", 'POINT', 'FLOAT_VECTOR', pattern.normal)
-    write_values(mesh, "tangent", 'POINT', 'FLOAT_VECTOR', pattern.tangent)
-    write_values(mesh, "rotation", 'POINT', 'QUATERNION', rotations(pattern.normal, pattern.tangent))
-    write_values(mesh, "triangle", 'POINT', 'INT', pattern.places.triangle)
-    write_values(mesh, "barycentric", 'POINT', 'FLOAT_VECTOR', pattern.places.barycentric)
+    mesh.vertices.add(len(bubbles))
+    write_values(mesh, "position", 'POINT', 'FLOAT_VECTOR', bubbles.position)
+    write_values(mesh, "id", 'POINT', 'INT', bubbles.ids)
+    write_values(mesh, "pitch", 'POINT', 'FLOAT', bubbles.pitch)
+    write_values(mesh, "row", 'POINT', 'INT', bubbles.row)
+    write_values(mesh, "normal", 'POINT', 'FLOAT_VECTOR', bubbles.normal)
+    write_values(mesh, "tangent", 'POINT', 'FLOAT_VECTOR', bubbles.tangent)
+    write_values(mesh, "rotation", 'POINT', 'QUATERNION', rotations(bubbles.normal, bubbles.tangent))
+    write_values(mesh, "triangle", 'POINT', 'INT', bubbles.places.triangle)
+    write_values(mesh, "barycentric", 'POINT', 'FLOAT_VECTOR', bubbles.places.barycentric)
+    write_sizes(obj, pattern)
     mesh.update()
     obj.matrix_parent_inverse = base_object.matrix_world.inverted_safe()
     obj.matrix_basis = Matrix(base.frame.tolist())
+
+
+def write_sizes(obj: bpy.types.Object, pattern: Pattern) -> None:
+    """Give the points of a pattern object the diameters in `pattern`, which has all their ids."""
+    bubbles = all_bubbles(pattern)
+    row = np.searchsorted(bubbles.ids, point_ids(obj))
+    wished = bubbles.diameter if bubbles.wished is None else bubbles.wished
+    write_values(obj.data, "diameter", 'POINT', 'FLOAT', bubbles.diameter[row])
+    write_values(obj.data, "wished", 'POINT', 'FLOAT', wished[row])
+    obj.data.update_tag()
     obj.update_tag()
 
 
-def write_diameters(obj: bpy.types.Object, diameter: Floats) -> None:
-    """Give the features of a pattern object these diameters (n,)."""
-    write_values(obj.data, "diameter", 'POINT', 'FLOAT', diameter)
-    obj.data.update_tag()
+def point_ids(obj: bpy.types.Object) -> Ints:
+    """Ids of the object's points, in the points' order."""
+    return read_values(obj.data.attributes["id"].data, "value", np.int32).astype(np.int64)
 
 
 def read_pattern(obj: bpy.types.Object, mesh: Mesh) -> Pattern:
     """The pattern that the object's points carry, for the base geometry `mesh` it was made on.
 
-    Points that the user has deleted by hand are left out. Positions are taken from the places on the base,
-    which holds them on the surface to the last bit.
+    Points that the user has deleted by hand are left out, and copies made by hand. Positions are taken from
+    the places on the base, which holds them on the surface to the last bit.
     """
     points = obj.data.attributes
+    ids, chosen = np.unique(point_ids(obj), return_index=True)
 
     def values(name: str, prop: str, dtype: type, width: int = 1) -> Floats:
-        """Attribute `name` of the points, (n,), or (n, width) where that is more than 1."""
-        return read_values(points[name].data, prop, dtype, width)
+        """Attribute `name` of the points in the order of ids, (n,), or (n, width) where that is above 1."""
+        return read_values(points[name].data, prop, dtype, width)[chosen]
 
     triangle = values("triangle", "value", np.int32).astype(np.int64)
     barycentric = values("barycentric", "vector", np.float32, 3).astype(np.float64)
     barycentric /= barycentric.sum(axis=1, keepdims=True)
     position = (mesh.corners[triangle] * barycentric[:, :, None]).sum(axis=1)
-    return Pattern(
+    known = "wished" in points  # files of 0.1 have none
+    bubbles = Pattern(
         places=Places(position, triangle, barycentric),
         normal=unit(values("normal", "vector", np.float32, 3).astype(np.float64)),
         tangent=unit(values("tangent", "vector", np.float32, 3).astype(np.float64)),
         pitch=values("pitch", "value", np.float32).astype(np.float64),
         diameter=values("diameter", "value", np.float32).astype(np.float64),
         row=values("row", "value", np.int32).astype(np.int64),
+        wished=values("wished", "value", np.float32).astype(np.float64) if known else None,
+        bubble=None if np.array_equal(ids, np.arange(len(ids))) else ids,
     )
+    return split(bubbles, bubbles.diameter > 0)
 
 
 def unit(vectors: Floats) -> Floats:

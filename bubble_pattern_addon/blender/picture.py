@@ -49,13 +49,20 @@ class View:
 
 
 def render_part(
-    path: Path, mesh: bpy.types.Mesh, matrix: Floats, pattern: Pattern, size: tuple[int, int] = SIZE
+    path: Path,
+    mesh: bpy.types.Mesh,
+    matrix: Floats,
+    pattern: Pattern,
+    size: tuple[int, int] = SIZE,
+    up: Floats | None = None,
 ) -> None:
     """Render `mesh`, standing at `matrix` (4, 4), as a PNG at `path`: three-quarter view, the pattern on top.
 
+    up: the way (3,) the part's own top looks; without, that of the pattern
+
     The studio is a scene of its own, which is taken down again. Raises OutputError where rendering fails.
     """
-    facing = pattern.normal.sum(axis=0)
+    facing = pattern.normal.sum(axis=0) if up is None else up * len(pattern)
     if np.linalg.norm(facing) < 0.3 * len(pattern):  # a pattern all round has no side of its own
         facing = np.array([0.0, 0.0, 1.0])
     local = read_values(mesh.attributes["position"].data, "vector", np.float32, 3).astype(np.float64)

@@ -10,7 +10,7 @@ GROUP = "Bubble Pattern Preview"
 MODIFIER = "Bubble Pattern"
 MATERIAL = "Bubble Pattern Preview"
 VERSION_KEY = "bubble_pattern_version"
-VERSION = 1
+VERSION = 2
 
 # A disc is this thick relative to its diameter: it stands a little proud of a curved surface, seen from
 # either side.
@@ -56,6 +56,8 @@ def build(group: bpy.types.NodeTree) -> None:
     link(disc.outputs["Mesh"], painted.inputs["Geometry"])
     link(given.outputs["Material"], painted.inputs["Material"])
     features = instances(group, given, painted.outputs["Geometry"], rotation, "diameter")
+    # none where the feature was left out, whose diameter is 0
+    link(named_attribute(group, "diameter", 'FLOAT').outputs["Attribute"], features.inputs["Selection"])
 
     ring = node('GeometryNodeMeshCircle')
     ring.inputs["Vertices"].default_value = SIDES

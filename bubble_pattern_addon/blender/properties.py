@@ -10,28 +10,35 @@ from typing import Any
 import bpy
 from bpy.props import (
     BoolProperty,
+    CollectionProperty,
     EnumProperty,
     FloatProperty,
+    FloatVectorProperty,
     IntProperty,
     PointerProperty,
     StringProperty,
 )
 
+from ..core.blending import Fill
 from ..core.errors import PatternError, RecipeError
-from ..core.metric import Constant, Field
+from ..core.metric import Constant, Described
 from ..core.recipe import (
+    FILL,
     Feature,
     Limits,
     Packing,
     Recipe,
     RegionChoice,
+    Seed,
     Shaping,
     check_recipe,
     recipe_to_toml,
 )
+from .field_properties import SIZE, BubblePatternField, length_property, point_of, typed
+from .field_recipe import described, take
 
 # Raised when a property changes its meaning; see upgrade.
-SETTINGS_VERSION = 1
+SETTINGS_VERSION = 2
 
 
 def reshape(settings: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
@@ -66,21 +73,13 @@ def is_mesh(_settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
     return obj.type == 'MESH'
 
 
-def length_property(name: str, description: str, default: float = 0.0, **options: Any) -> Any:
-    """A length in the scene's unit, fine enough for fractions of a millimeter."""
-    return FloatProperty(
-        name=name,
-        description=description,
-        subtype='DISTANCE',
-        default=default,
-        step=1,
-        precision=4,
-        **options,
+class BubblePatternSeed(bpy.types.PropertyGroup):
+    """A feature whose diameter the user has fixed, by its place in the frame of the base."""
+
+    at: FloatVectorProperty(
+        name="Place", description="Where the feature is", size=3, subtype='TRANSLATION', precision=6
     )
-
-
-# A length that something stands for cannot be nothing.
-SIZE = {"min": 1e-6, "soft_max": 10.0}
+    diameter: length_property("Diameter", "Diameter that the feature keeps", 0.001, **SIZE)
 
 
 class BubblePatternSettings(bpy.types.PropertyGroup):
@@ -113,10 +112,32 @@ class BubblePatternSettings(bpy.types.PropertyGroup):
         **SIZE,
         update=repack,
     )
+    pitch_field: PointerProperty(
+        name="Pitch Field", description="How the pitch varies over the region", type=BubblePatternField
+    )
     edge_offset: length_property(
         name="Edge Offset",
         description="Extra distance between the first row of features and the boundary of the region",
         default=0.0,
+        update=repack,
+    )
+    orientation: EnumProperty(
+        name="Rows",
+        description="Where the rows of the arrangement run",
+        items=(
+            ('EDGE', "Along Edge", "Along the longest straight edge of the region"),
+            ('BEST', "Best of Four", "In the best of four directions, which takes four times as long"),
+            ('GIVEN', "Direction", "Along a direction"),
+        ),
+        default='EDGE',
+        update=repack,
+    )
+    rows_along: FloatVectorProperty(
+        name="Row Direction",
+        description="Direction of the rows in the coordinates of the base",
+        size=3,
+        subtype='XYZ',
+        default=(1.0, 0.0, 0.0),
         update=repack,
     )
     integrator: EnumProperty(
@@ -160,6 +181,61 @@ class BubblePatternSettings(bpy.types.PropertyGroup):
         **SIZE,
         update=reshape,
     )
+    diameter_mode: EnumProperty(
+        name="Diameter As",
+        description="How the size of the features is given",
+        items=(
+            ('SIZE', "Size", "As a diameter"),
+            ('SHARE', "Share of Pitch", "Relative to the pitch there: large features where it is wide"),
+        ),
+        default='SIZE',
+        update=reshape,
+    )
+    fill: FloatProperty(
+        name="Diameter / Pitch",
+        description="Diameter of the features relative to the pitch where they are",
+        subtype='FACTOR',
+        default=FILL,
+        min=0.01,
+        max=0.99,
+        update=reshape,
+    )
+    diameter_field: PointerProperty(
+        name="Diameter Field",
+        description="How the diameter varies over the region",
+        type=BubblePatternField,
+    )
+    seeds: CollectionProperty(
+        name="Fixed Sizes",
+        description="Features that keep the size they were given, while the others level out between them",
+        type=BubblePatternSeed,
+    )
+    solver: EnumProperty(
+        name="Averages",
+        description="How the sizes between fixed ones are found",
+        items=(
+            ('DIRECT', "Direct", "Solved at once"),
+            ('ITERATE', "Iterate", "Averaged again and again, until sizes no longer change"),
+        ),
+        default='DIRECT',
+        update=reshape,
+    )
+    shaping_tolerance: FloatProperty(
+        name="Size Tolerance",
+        description="Stop averaging when no size changes by more than this share",
+        default=Shaping().tolerance,
+        min=1e-12,
+        max=1.0,
+        precision=6,
+        update=reshape,
+    )
+    shaping_iterations: IntProperty(
+        name="Size Iterations",
+        description="Most times that sizes are averaged",
+        default=Shaping().iterations,
+        min=1,
+        update=reshape,
+    )
     depth_mode: EnumProperty(
         name="Depth",
         description="How deep the holes go",
@@ -183,6 +259,11 @@ class BubblePatternSettings(bpy.types.PropertyGroup):
         soft_max=128,
         max=1024,
     )
+    facet_tolerance: length_property(
+        name="Facet Tolerance",
+        description="Most that the facets of a hole may stray from its circle, or 0 to choose it by the size",
+        min=0.0,
+    )
     min_web: length_property(
         name="Min Web",
         description="Material that must remain between two features",
@@ -193,6 +274,13 @@ class BubblePatternSettings(bpy.types.PropertyGroup):
     min_margin: length_property(
         name="Min Margin",
         description="Material that must remain between a feature and the boundary of the region",
+        default=0.0,
+        min=0.0,
+        update=reshape,
+    )
+    min_diameter: length_property(
+        name="Min Diameter",
+        description="Leave out features that would have to be smaller than this",
         default=0.0,
         min=0.0,
         update=reshape,
@@ -217,10 +305,14 @@ class BubblePatternSettings(bpy.types.PropertyGroup):
     # What came out of the last generation. -1 where nothing could be measured.
     made_with: StringProperty(options={'HIDDEN'})
     fingerprint: StringProperty(options={'HIDDEN'})
+    size_trace: StringProperty(options={'HIDDEN'})
     trouble: StringProperty(options={'HIDDEN'})
     version: IntProperty(options={'HIDDEN'})
     seconds: FloatProperty(options={'HIDDEN'})
     count: IntProperty(name="Features", description="Number of features", options={'HIDDEN'})
+    shrunk: IntProperty(options={'HIDDEN'})
+    dropped: IntProperty(options={'HIDDEN'})
+    notes: StringProperty(options={'HIDDEN'})
     six: FloatProperty(name="Order", subtype='FACTOR', min=-1.0, max=1.0, options={'HIDDEN'})
     gap_min: FloatProperty(name="Smallest Gap", options={'HIDDEN'})
     web: FloatProperty(name="Smallest Web", subtype='DISTANCE', options={'HIDDEN'})
@@ -229,57 +321,106 @@ class BubblePatternSettings(bpy.types.PropertyGroup):
     verdict: StringProperty(options={'HIDDEN'})
 
 
-def typed(value: float) -> float:
-    """The number that was typed, of the 32 bits that Blender keeps of it: 0.0018, not 0.00179999996."""
-    return float(f"{value:.7g}")
-
-
 def recipe_of(settings: Any) -> Recipe:
     """The recipe that `settings` stand for. Raises RecipeError where they contradict one another."""
     through = settings.depth_mode == 'THROUGH'
     recipe = Recipe(
         region=RegionChoice(attribute=settings.region or None),
         packing=Packing(
-            pitch=Constant(typed(settings.pitch)),
+            pitch=described(settings.pitch_field, settings.pitch, False, "[packing] pitch"),
             edge_offset=typed(settings.edge_offset),
+            orientation=(
+                point_of(settings.rows_along)
+                if settings.orientation == 'GIVEN'
+                else settings.orientation.lower()
+            ),
             integrator=settings.integrator.lower(),
             seed=settings.seed,
             iterations=settings.iterations,
             tolerance=typed(settings.tolerance),
         ),
-        shaping=Shaping(diameter=Constant(typed(settings.diameter))),
-        feature=Feature(depth=None if through else typed(settings.depth), sides=settings.sides or None),
-        limits=Limits(min_web=typed(settings.min_web), min_margin=typed(settings.min_margin)),
+        shaping=Shaping(
+            diameter=diameter_of(settings),
+            seeds=tuple(Seed(point_of(seed.at), typed(seed.diameter)) for seed in settings.seeds),
+            solver=settings.solver.lower(),
+            tolerance=typed(settings.shaping_tolerance),
+            iterations=settings.shaping_iterations,
+        ),
+        feature=Feature(
+            depth=None if through else typed(settings.depth),
+            sides=settings.sides or None,
+            tolerance=typed(settings.facet_tolerance) or None,
+        ),
+        limits=Limits(
+            min_web=typed(settings.min_web),
+            min_margin=typed(settings.min_margin),
+            min_diameter=typed(settings.min_diameter),
+        ),
     )
     check_recipe(recipe)
     return recipe
 
 
+def diameter_of(settings: Any) -> Described:
+    """The shaping metric: a size, or a share of the pitch."""
+    if settings.diameter_mode == 'SHARE':
+        return Fill(described(settings.diameter_field, settings.fill, True, "[shaping] fill"))
+    return described(settings.diameter_field, settings.diameter, False, "[shaping] diameter")
+
+
 def take_recipe(settings: Any, recipe: Recipe) -> None:
-    """Set `settings` to what `recipe` says. Raises RecipeError for what the sidebar cannot show."""
+    """Set `settings` to what `recipe` says."""
     live, settings.live = settings.live, False  # one change after the other would lay a pattern each time
-    packing, feature = recipe.packing, recipe.feature
-    settings.pitch = number(packing.pitch, "[packing] pitch")
-    settings.edge_offset = packing.edge_offset
-    settings.integrator = packing.integrator.upper()
-    settings.seed = packing.seed
-    settings.iterations = packing.iterations
-    settings.tolerance = packing.tolerance
-    settings.diameter = number(recipe.shaping.diameter, "[shaping] diameter")
+    take_packing(settings, recipe.packing)
+    take_shaping(settings, recipe.shaping)
+    feature = recipe.feature
     settings.depth_mode = 'THROUGH' if feature.depth is None else 'BLIND'
     if feature.depth is not None:
         settings.depth = feature.depth
     settings.sides = feature.sides or 0
+    settings.facet_tolerance = feature.tolerance or 0.0
     settings.min_web = recipe.limits.min_web
     settings.min_margin = recipe.limits.min_margin
+    settings.min_diameter = recipe.limits.min_diameter
     settings.live = live
 
 
-def number(field: Field, where: str) -> float:
-    """The value of a field that is the same everywhere."""
-    if isinstance(field, Constant):
-        return field.value
-    raise RecipeError(f"{where} is a field that the sidebar cannot show: give a number")
+def take_packing(settings: Any, packing: Packing) -> None:
+    """Set the settings of step 1."""
+    if isinstance(packing.pitch, Constant):
+        settings.pitch_field.kind = 'CONSTANT'
+        settings.pitch = packing.pitch.value
+    else:
+        take(settings.pitch_field, packing.pitch, False)
+    settings.edge_offset = packing.edge_offset
+    if isinstance(packing.orientation, str):
+        settings.orientation = packing.orientation.upper()
+    else:
+        settings.orientation = 'GIVEN'
+        settings.rows_along = packing.orientation
+    settings.integrator = packing.integrator.upper()
+    settings.seed = packing.seed
+    settings.iterations = packing.iterations
+    settings.tolerance = packing.tolerance
+
+
+def take_shaping(settings: Any, shaping: Shaping) -> None:
+    """Set the settings of step 2."""
+    share = isinstance(shaping.diameter, Fill)
+    size = shaping.diameter.share if isinstance(shaping.diameter, Fill) else shaping.diameter
+    settings.diameter_mode = 'SHARE' if share else 'SIZE'
+    if isinstance(size, Constant):
+        settings.diameter_field.kind = 'CONSTANT'
+        setattr(settings, "fill" if share else "diameter", size.value)
+    else:
+        take(settings.diameter_field, size, share)
+    settings.seeds.clear()
+    for seed in shaping.seeds:
+        entry = settings.seeds.add()
+        entry.at, entry.diameter = seed.at, seed.diameter
+    settings.solver = shaping.solver.upper()
+    settings.shaping_tolerance = shaping.tolerance
+    settings.shaping_iterations = shaping.iterations
 
 
 def packing_text(recipe: Recipe) -> str:
@@ -289,7 +430,7 @@ def packing_text(recipe: Recipe) -> str:
 
 def recipe_text(recipe: Recipe) -> str:
     """What the pattern's points depend on, as text; how the features are cut is left out."""
-    return recipe_to_toml(replace(recipe, feature=Feature(), limits=Limits()))
+    return recipe_to_toml(replace(recipe, feature=Feature()))
 
 
 def length_text(context: bpy.types.Context, value: float) -> str:
@@ -349,13 +490,17 @@ def pattern_of(obj: bpy.types.Object | None) -> bpy.types.Object | None:
     return on_base[0] if on_base else None
 
 
+CLASSES = (BubblePatternField, BubblePatternSeed, BubblePatternSettings)
+_register, _unregister = bpy.utils.register_classes_factory(CLASSES)
+
+
 def register() -> None:
     """Give every object its settings."""
-    bpy.utils.register_class(BubblePatternSettings)
+    _register()
     bpy.types.Object.bubble_pattern = PointerProperty(type=BubblePatternSettings)
 
 
 def unregister() -> None:
     """Take the settings back."""
     del bpy.types.Object.bubble_pattern
-    bpy.utils.unregister_class(BubblePatternSettings)
+    _unregister()

@@ -72,6 +72,24 @@ def evaluated_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Ite
         evaluated.to_mesh_clear()
 
 
+@contextmanager
+def shown(obj: bpy.types.Object, context: bpy.types.Context) -> Iterator[None]:
+    """Let `obj` be visible for a while: Blender does not run the modifiers of hidden objects."""
+    if obj.name not in context.view_layer.objects:
+        raise BaseError(f'"{obj.name}" is not in this view layer: include its collection')
+    was_hidden, was_disabled = obj.hide_get(), obj.hide_viewport
+    if not was_hidden and not was_disabled:
+        yield
+        return
+    obj.hide_set(False)
+    obj.hide_viewport = False
+    try:
+        yield
+    finally:
+        obj.hide_set(was_hidden)
+        obj.hide_viewport = was_disabled
+
+
 def world_frame(obj: bpy.types.Object) -> Floats:
     """(4, 4) rigid part of the object's world matrix."""
     location, rotation, _scale = obj.matrix_world.decompose()

@@ -2,16 +2,31 @@
 
 from __future__ import annotations
 
+import tomllib
+
 import bpy
 from bpy.app.handlers import persistent
 
+from ..core.errors import PatternError
+from ..core.recipe import recipe_from_dict
 from .preview_nodes import VERSION, VERSION_KEY, show_preview
-from .properties import SETTINGS_VERSION, is_pattern
+from .properties import SETTINGS_VERSION, is_pattern, recipe_of, recipe_text
 
 
 def upgrade_settings(settings: bpy.types.PropertyGroup) -> None:
-    """Bring settings of an older version up to date; there has been one version so far."""
+    """Bring settings of an older version up to date.
+
+    Version 1 did not write limits down with what the points were made with, nor what came later: a pattern
+    that was up to date stays so.
+    """
     settings.version = SETTINGS_VERSION
+    try:
+        recipe = recipe_of(settings)
+        made = recipe_from_dict(tomllib.loads(settings.made_with))
+    except (PatternError, tomllib.TOMLDecodeError):
+        return  # outdated it was, and remains
+    if (made.region, made.packing, made.shaping) == (recipe.region, recipe.packing, recipe.shaping):
+        settings.made_with = recipe_text(recipe)
 
 
 @persistent

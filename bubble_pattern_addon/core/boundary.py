@@ -13,6 +13,8 @@ from .region import Region
 # Nearest samples whose segments are measured exactly; two segments meet at a corner, a sheet's fold may add
 # some more.
 CANDIDATES = 4
+# More, where one that is farther away may count as nearer because it reserves room.
+RESERVED_CANDIDATES = 24
 
 
 @dataclass(frozen=True)
@@ -63,28 +65,33 @@ def signature(region: Region, points: Floats, row: Ints, reach: float) -> Floats
 
 
 def nearest_boundary(boundary: Boundary, points: Floats, row: Ints) -> tuple[Floats, Floats]:
-    """Distance (n,) to the nearest boundary segment of the same sheet, and the nearest point on it (n, 3).
+    """Distance (n,) to the nearest boundary segment of the same sheet less what that one reserves, and the
+    nearest point on it (n, 3).
 
     points: (n, 3) on the triangles `row` (n,)
     """
-    distance, foot, _ = _nearest_segment(boundary, points, row)
-    return distance, foot
+    distance, foot, segment = _nearest_segment(boundary, points, row)
+    return distance - boundary.region.reserve[segment], foot
 
 
 def inside_distance(boundary: Boundary, points: Floats, row: Ints) -> Floats:
-    """Distance (n,) to the nearest boundary segment, negative on its other side.
+    """Distance (n,) to the nearest boundary segment, negative on its other side, less what it reserves.
 
     points: (n, 3) in the planes of the triangles `row` (n,) of a flat region, inside it or not
     """
     distance, foot, segment = _nearest_segment(boundary, points, row)
     along = boundary.segments[segment, 1] - boundary.segments[segment, 0]
     inward = np.cross(boundary.region.normals[row], along)
-    return np.copysign(distance, np.einsum("nc,nc->n", points - foot, inward))
+    side = np.copysign(distance, np.einsum("nc,nc->n", points - foot, inward))
+    return side - boundary.region.reserve[segment]
 
 
 def _nearest_segment(boundary: Boundary, points: Floats, row: Ints) -> tuple[Floats, Floats, Ints]:
-    """Distance (n,), nearest point (n, 3) and number (n,) of the nearest boundary segment."""
-    count = min(CANDIDATES, len(boundary.owner))
+    """Distance (n,), nearest point (n, 3) and number (n,) of the boundary segment that is nearest when what
+    each reserves is taken off.
+    """
+    reserve = boundary.region.reserve
+    count = min(RESERVED_CANDIDATES if reserve.any() else CANDIDATES, len(boundary.owner))
     _, near = boundary.tree.query(signature(boundary.region, points, row, boundary.reach), k=count)
     segment = boundary.owner[near.reshape(len(points), count)]
     ends = boundary.segments[segment]
@@ -95,6 +102,6 @@ def _nearest_segment(boundary: Boundary, points: Floats, row: Ints) -> tuple[Flo
     )
     foot = start + np.clip(share, 0, 1)[..., None] * along
     distance = np.linalg.norm(points[:, None] - foot, axis=2)
-    best = distance.argmin(axis=1)
+    best = (distance - reserve[segment]).argmin(axis=1)
     pick = np.arange(len(points))
     return distance[pick, best], foot[pick, best], segment[pick, best]

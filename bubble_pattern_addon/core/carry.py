@@ -19,9 +19,13 @@ def same_places(known: Floats, points: Floats) -> tuple[Ints, Ints]:
 
     def find(places: Floats, asked: np.ndarray) -> Ints:
         """Row of `known` at each of `places`, (n, 3), whose keys are `asked`, (n,): (n,), -1 for none."""
-        row = order[np.minimum(np.searchsorted(ranked, asked), len(known) - 1)]
-        there = known[row] == places
-        return np.where(there[:, 0] & there[:, 1] & there[:, 2], row, -1)
+        rank = np.minimum(np.searchsorted(ranked, asked), len(known) - 1)
+        found = np.flatnonzero(ranked[rank] == asked)
+        row = order[rank[found]]
+        same = (known[row] == places[found]).all(axis=1)
+        rows = np.full(len(places), -1)
+        rows[found[same]] = row[same]
+        return rows
 
     return find(known, keys), find(points, _place_keys(points))
 
@@ -36,17 +40,15 @@ def _place_keys(points: Floats) -> np.ndarray:
     )
 
 
-def whole_faces(triangles: Ints, face: Ints, base: Ints) -> tuple[Bools, Ints]:
-    """Which `triangles` of a part, (T', 3), are whole triangles of `base`, (T, 3), and by how many places
-    those must be turned to have their corners in the base's order, (T',), 0 for the others.
+def whole_faces(triangles: Ints, name: Ints, face: Ints, base: Ints) -> tuple[Bools, Ints]:
+    """Which `triangles` of a part, (F, 3), are whole triangles of `base`, (T, 3), and by how many places
+    those must be turned to have their corners in the base's order, (F,), 0 for the others.
 
-    face: (T',) triangle of the base each lies on, below 0 for none. Corners are compared by their index, so
-    those of the part must be named like the base's, below 0 for new ones.
+    name: (V',) what each vertex of the part is called in `base`, below 0 for new ones; face: (F,) triangle of
+    the base each of the triangles lies on
     """
-    pieces = np.bincount(face[face >= 0], minlength=len(base))
-    alone = np.flatnonzero(face >= 0)
-    alone = alone[pieces[face[alone]] == 1]
-    a, b, c = triangles[alone].T
+    alone = np.flatnonzero(np.bincount(face, minlength=len(base))[face] == 1)
+    a, b, c = name[triangles[alone]].T
     first, second, third = base[face[alone]].T
     whole, turn = np.zeros(len(face), dtype=bool), np.zeros(len(face), dtype=np.int64)
     for places, (one, two, three) in enumerate(((a, b, c), (b, c, a), (c, a, b))):
@@ -56,7 +58,7 @@ def whole_faces(triangles: Ints, face: Ints, base: Ints) -> tuple[Bools, Ints]:
 
 
 def turned(triangles: Ints, turn: Ints) -> Ints:
-    """`triangles`, (T, 3), each with its corners moved up by `turn` places, (T,)."""
+    """`triangles`, (T, 3), with the corners of the first moved up by `turn` places, (F,) with F up to T."""
     moved = triangles.copy()
     for places in (1, 2):
         some = np.flatnonzero(turn == places)
@@ -68,27 +70,27 @@ def drift(part: Mesh, face: Ints, named: Ints, changed: Ints, base: Mesh) -> flo
     """How far the surface may have moved where the part has the faces `changed` of `base`, (k,), in other
     pieces than the base has.
 
-    face: (T',) triangle of the base each triangle of the part lies on, below 0 for none; named: (V',) vertex
-    of the base at each of the part's, below 0 for new ones. The largest of: how far the pieces' corners lie
-    off the face's plane, the width of what they miss of its area or add to it, and the width of a face
-    without any piece. Infinite where a piece has a corner that is not the base's.
+    face: (F,) triangle of the base each of the first triangles of the part lies on; named: (V',) vertex of
+    the base at each of the part's, below 0 for new ones. The largest of: how far the pieces' corners lie off
+    the face's plane, the width of what they miss of its area or add to it, and the width of a face without
+    any piece. Infinite where a piece has a corner that is not the base's.
     """
-    asked = np.zeros(len(base.triangles), dtype=bool)
-    asked[changed] = True
-    piece = np.flatnonzero(face >= 0)
-    piece = piece[asked[face[piece]]]
-    if np.any(named[part.triangles[piece]] < 0):
+    asked = np.full(len(base.triangles), -1)
+    asked[changed] = np.arange(len(changed))
+    piece = np.flatnonzero(asked[face] >= 0)
+    owner = asked[face[piece]]
+    pieces, faces = Mesh(part.vertices, part.triangles[piece]), Mesh(base.vertices, base.triangles[changed])
+    if np.any(named[pieces.triangles] < 0):
         return np.inf
-    plane = base.area_vectors
+    plane, corners = faces.area_vectors, faces.corners
     area = np.linalg.norm(plane, axis=1)
-    corners = base.corners[changed]
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    made = np.linalg.norm(Mesh(part.vertices, part.triangles[piece]).area_vectors, axis=1)
-    covered = np.bincount(face[piece], weights=made, minlength=len(area))[changed]
-    width = np.abs(covered - area[changed]) / np.where(longest > 0, longest, 1)
+    made = np.linalg.norm(pieces.area_vectors, axis=1)
+    covered = np.bincount(owner, weights=made, minlength=len(area))
+    width = np.abs(covered - area) / np.where(longest > 0, longest, 1)
     normal = plane / np.where(area > 0, area, 1)[:, None]
-    offset = part.corners[piece] - base.vertices[base.triangles[face[piece], 0]][:, None]
-    off = np.abs(np.einsum("mck,mk->mc", offset, normal[face[piece]]))
+    offset = pieces.corners - corners[owner, :1]
+    off = np.abs(np.einsum("mck,mk->mc", offset, normal[owner]))
     return float(max(width.max(initial=0), off.max(initial=0)))
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .closed import euler_number, is_closed, shell_volumes
-from .mesh import Mesh
+from .closed import Measures
 
 
 @dataclass(frozen=True)
@@ -45,18 +44,17 @@ class Check:
 
 
 def check_part(
-    mesh: Mesh, base: Mesh, through: int, unchanged: bool, problems: list[str], notes: list[str]
+    part: Measures, base: Measures, through: int, unchanged: bool, problems: list[str], notes: list[str]
 ) -> Check:
-    """Measure the part `mesh` made from `base` with `through` through-holes; what is wrong comes after
-    `problems`.
+    """Judge what was measured on a part made from `base` with `through` through-holes; what is wrong comes
+    after `problems`.
     """
-    before, after = shell_volumes(base), shell_volumes(mesh)
-    euler, base_euler = euler_number(mesh.triangles), euler_number(base.triangles)
+    before, after = base.volumes, part.volumes
+    euler, base_euler = part.euler, base.euler
     expected = base_euler - 2 * through
     bodies, base_bodies = int((after > 0).sum()), int((before > 0).sum())
-    watertight = is_closed(mesh.triangles)
     problems = list(problems)
-    if not watertight:
+    if not part.closed:
         problems.append("The part is not watertight: check the base for flaws near the holes.")
     if euler != expected:
         problems.append(
@@ -70,7 +68,7 @@ def check_part(
     if not unchanged:
         problems.append("Faces of the base that no hole touches were changed: check the base for flaws.")
     return Check(
-        watertight=watertight,
+        watertight=part.closed,
         euler=euler,
         base_euler=base_euler,
         genus=len(after) - euler // 2,

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .boxtree import build_tree
-from .crossings import close_pairs
+from .boxtree import build_tree, close_pairs
 from .mesh import Floats, Ints
 from .pattern import Pattern
 
@@ -25,7 +24,9 @@ def colliding(pattern: Pattern, chosen: Ints, top: Floats, bottom: Floats) -> In
     start = pattern.position[chosen] + top[chosen, None] * axis
     end = pattern.position[chosen] - bottom[chosen, None] * axis
     reach = radius[:, None] * np.sqrt(np.clip(1 - axis**2, 0, 1))
-    boxes = np.stack([np.minimum(start, end) - reach, np.maximum(start, end) + reach, start], axis=1)
+    boxes = np.stack([np.minimum(start, end) - reach, np.maximum(start, end) + reach, start]).transpose(
+        2, 0, 1
+    )
     met = np.zeros(len(chosen), dtype=bool)
     for one, other in close_pairs(build_tree(boxes)):
         shortest = _shortest(start[one], end[one], start[other], end[other])

@@ -2,34 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from .boxtree import BoxTree
-from .mesh import Bools, Floats, Ints, Mesh
+from .boxtree import BoxTree, close_pairs
+from .mesh import Bools, Floats, Ints, Mesh, area_columns
 
 SHALLOWEST = 1e-6
 """Times the size of the mesh that faces must reach through each other to count: single precision in files
 makes touching faces overlap by less.
 """
-BLOCK = 1 << 18
-"""Pairs looked at together: bounds the memory."""
 
 
-def crossing_triangles(mesh: Mesh, tree: BoxTree) -> Ints:
+def crossing_triangles(mesh: Mesh, columns: Floats, tree: BoxTree, sheet: Ints) -> Ints:
     """Pairs of triangles of `mesh` that reach through each other, (k, 2), k = 0 for a sound surface.
+
+    columns: the mesh's; tree: of its triangles; sheet: (T,) the one each triangle is on, below 0 for none,
+    see `sheets`: two of the same sheet are not compared
 
     Two triangles do if an edge of one pierces the other, or if they lie in one plane, face the same way and
     overlap. Faces that only touch do not, nor do faces back to back, as where two bodies lie on each other.
     """
     size = np.linalg.norm(mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0))
     slack = SHALLOWEST * float(size)
-    planes = _planes(mesh)
+    planes = _planes(mesh, columns)
     normal = np.ascontiguousarray(planes.normal.T)
     overlapping, stabs = [], []
-    for one, other in close_pairs(tree):
+    for one, other in close_pairs(tree, sheet):
         # most pairs are neighbours, whose planes clear them: what is cheap and clears many comes first
         over = planes.heights(one, other)
         low, high = over.min(axis=0), over.max(axis=0)
@@ -48,29 +48,6 @@ def crossing_triangles(mesh: Mesh, tree: BoxTree) -> Ints:
     if not stabs:
         return np.zeros((0, 2), dtype=np.int64)
     return np.concatenate([*overlapping, _piercing(mesh, np.concatenate(stabs))])
-
-
-def close_pairs(tree: BoxTree) -> Iterator[tuple[Ints, Ints]]:
-    """Blocks of pairs of triangles whose boxes meet, (m,) and (m,), every pair once."""
-    root = np.zeros(1, dtype=np.int64)
-    waiting = [(len(tree.middle) - 1, root, root)]
-    while waiting:
-        level, one, other = waiting.pop()
-        if len(one) > BLOCK:
-            half = len(one) // 2
-            waiting += [(level, one[:half], other[:half]), (level, one[half:], other[half:])]
-            continue
-        for middle, size in zip(tree.middle[level], tree.half[level], strict=True):
-            meet = np.abs(middle[one] - middle[other]) <= size[one] + size[other]
-            one, other = one[meet], other[meet]
-        if level == 0:
-            apart = one != other
-            yield tree.order[one[apart]], tree.order[other[apart]]
-            continue
-        one = np.stack([2 * one, 2 * one, 2 * one + 1, 2 * one + 1], axis=1).ravel()
-        other = np.stack([2 * other, 2 * other + 1, 2 * other, 2 * other + 1], axis=1).ravel()
-        there = (one <= other) & (other < tree.middle[level - 1].shape[1])
-        waiting.append((level - 1, one[there], other[there]))
 
 
 @dataclass(frozen=True)
@@ -94,14 +71,13 @@ class _Planes:
         return above
 
 
-def _planes(mesh: Mesh) -> _Planes:
+def _planes(mesh: Mesh, columns: Floats) -> _Planes:
     # from the middle, so that heights are not small differences of large numbers
-    middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
-    corners = np.ascontiguousarray((mesh.vertices - middle).T)[:, np.ascontiguousarray(mesh.triangles.T)]
-    plane = np.ascontiguousarray(mesh.area_vectors.T)
-    length = np.sqrt((plane**2).sum(axis=0))
+    corners = columns - ((mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2)[:, None, None]
+    normal = area_columns(columns)
+    length = np.sqrt((normal**2).sum(axis=0))
     # a face without area has no plane: its heights are 0, so it is never through anything
-    normal = plane / np.where(length > 0, length, 1)
+    normal /= np.where(length > 0, length, 1)
     return _Planes(corners, normal, (corners[:, 0] * normal).sum(axis=0))
 
 

@@ -101,6 +101,8 @@ def make_cutters(pattern: Pattern, feature: Feature, chosen: Ints, top: Floats, 
 
 
 def _joined(parts: list[np.ndarray], shape: tuple[int, ...], kind: type) -> np.ndarray:
+    if len(parts) == 1:
+        return parts[0]
     return np.concatenate(parts) if parts else np.zeros(shape, dtype=kind)
 
 

@@ -44,7 +44,9 @@ def limited(bubbles: Pattern, region: Region, limits: Limits) -> Pattern:
     wished = bubbles.diameter
     diameter, kept = within_limits(bubbles, region, limits)
     if bubbles.partners is not None:
-        diameter, kept = _alike(bubbles.partners, wished, diameter, kept)
+        order = np.argsort(bubbles.ids)
+        partners = order[np.searchsorted(bubbles.ids, bubbles.partners, sorter=order)]
+        diameter, kept = _alike(partners, wished, diameter, kept)
     return split(replace(bubbles, diameter=np.where(kept, diameter, 0.0), wished=wished), kept)
 
 

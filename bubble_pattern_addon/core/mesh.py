@@ -31,9 +31,18 @@ class Mesh:
     @property
     def area_vectors(self) -> Floats:
         """Outward normals as long as twice the triangle's area, (T, 3)."""
-        # a column per coordinate: several times faster than rows of three
-        x, y, z = np.ascontiguousarray(self.vertices.T)
-        a, b, c = np.ascontiguousarray(self.triangles.T)
-        ux, uy, uz = (side[b] - side[a] for side in (x, y, z))
-        vx, vy, vz = (side[c] - side[a] for side in (x, y, z))
-        return np.stack([uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx], axis=1)
+        return np.ascontiguousarray(area_columns(self.columns).T)
+
+    @property
+    def columns(self) -> Floats:
+        """Corner positions with a row per coordinate and corner, (3 coordinates, 3 corners, T): several times
+        faster to work on than rows of three.
+        """
+        place = np.ascontiguousarray(self.triangles.T)
+        return np.stack([coordinate[place] for coordinate in np.ascontiguousarray(self.vertices.T)])
+
+
+def area_columns(columns: Floats) -> Floats:
+    """Outward normals, as long as twice the area, of triangles given as `Mesh.columns`: (3, T)."""
+    (ux, vx), (uy, vy), (uz, vz) = columns[:, 1:] - columns[:, :1]
+    return np.stack([uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx])

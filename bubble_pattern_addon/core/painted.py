@@ -161,16 +161,18 @@ def mean_normal(region: Region) -> Floats:
     return np.asarray(total)
 
 
+def upward(sight: Floats) -> Floats:
+    """What is up, (3,), for one who looks against the unit vector `sight`: z, or y where that is z."""
+    return np.array([0.0, 1.0, 0.0] if abs(sight[2]) > 0.999 else [0.0, 0.0, 1.0])
+
+
 def _upright(sight: Floats, up: Point | None) -> tuple[Floats, Floats]:
     """Unit vectors to the right and up as seen against `sight`."""
-    if up is None:
-        upward = np.array([0.0, 1.0, 0.0]) if abs(sight[2]) > 0.999 else np.array([0.0, 0.0, 1.0])
-    else:
-        upward = np.array(up)
-    right = np.cross(upward, sight)
+    ahead = upward(sight) if up is None else np.array(up)
+    right = np.cross(ahead, sight)
     length = np.linalg.norm(right)
-    if length <= 1e-9 * np.linalg.norm(upward):
-        raise FieldError(f"up = {list(upward)} points at the viewer: give a direction across project")
+    if length <= 1e-9 * np.linalg.norm(ahead):
+        raise FieldError(f"up = {ahead.tolist()} points at the viewer: give a direction across project")
     right = right / length
     return right, np.cross(sight, right)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -82,26 +83,65 @@ def all_bubbles(pattern: Pattern) -> Pattern:
     """Every bubble of the pattern in the order of packing, those whose feature was left out among them."""
     if pattern.dropped is None:
         return pattern
-    parts = (pattern, pattern.dropped)
-    order = np.argsort(np.concatenate([part.ids for part in parts]))
+    both = _end_to_end((pattern, pattern.dropped))
+    order = np.argsort(both.ids)
+    ids = both.ids[order]
+    bubble = None if np.array_equal(ids, np.arange(len(ids))) else ids
+    return replace(take(both, order), bubble=bubble, notes=pattern.notes)
 
-    def joined(name: str) -> Any:
-        return np.concatenate([getattr(part, name) for part in parts])[order]
 
-    places = [part.places for part in parts]
-    names = ("position", "triangle", "barycentric")
-    return Pattern(
-        Places(*(np.concatenate([getattr(place, name) for place in places])[order] for name in names)),
-        **{name: joined(name) for name in COLUMNS},
-        wished=None if pattern.wished is None else joined("wished"),
-        packing_notes=pattern.packing_notes,
-        symmetry=pattern.symmetry,
-        partners=None if pattern.partners is None else joined("partners"),
+def joined(patterns: Sequence[Pattern]) -> Pattern:
+    """Patterns on one base as one, at least one of them; the ids of each go on from those before it."""
+    if len(patterns) == 1:
+        return patterns[0]
+    numbered: list[Pattern] = []
+    first = 0
+    for pattern in patterns:
+        parts = [part for part in (pattern, pattern.dropped) if part is not None]
+        numbered.append(_renumbered(pattern, first))
+        if pattern.dropped is not None:
+            numbered[-1] = replace(numbered[-1], dropped=_renumbered(pattern.dropped, first))
+        first += 1 + max(int(part.ids.max(initial=-1)) for part in parts)
+    left_out = [pattern.dropped for pattern in numbered if pattern.dropped is not None]
+    return replace(
+        _end_to_end(numbered),
+        dropped=_end_to_end(left_out) if left_out else None,
+        notes=tuple(dict.fromkeys(note for pattern in patterns for note in pattern.notes)),
     )
 
 
-def take(pattern: Pattern, which: Bools) -> Pattern:
-    """The features `which` (n,) with their ids."""
+def _renumbered(pattern: Pattern, first: int) -> Pattern:
+    """The pattern with all ids raised by `first`."""
+    partners = None if pattern.partners is None else pattern.partners + first
+    return replace(pattern, bubble=pattern.ids + first, partners=partners)
+
+
+def _end_to_end(parts: Sequence[Pattern]) -> Pattern:
+    """The features of all parts with their ids, without what was left out."""
+
+    def column(name: str) -> Any:
+        return np.concatenate([getattr(part, name) for part in parts])
+
+    places = [part.places for part in parts]
+    names = ("position", "triangle", "barycentric")
+    # Parts with different symmetries, or one without, have none together.
+    words = {None if part.partners is None else part.symmetry for part in parts}
+    symmetric = len(words) == 1 and None not in words
+    known = any(part.wished is not None for part in parts)
+    wished = [part.diameter if part.wished is None else part.wished for part in parts]
+    return Pattern(
+        Places(*(np.concatenate([getattr(place, name) for place in places]) for name in names)),
+        **{name: column(name) for name in COLUMNS},
+        wished=np.concatenate(wished) if known else None,
+        bubble=column("ids"),
+        packing_notes=tuple(dict.fromkeys(note for part in parts for note in part.packing_notes)),
+        symmetry=parts[0].symmetry if symmetric else None,
+        partners=column("partners") if symmetric else None,
+    )
+
+
+def take(pattern: Pattern, which: Bools | Ints) -> Pattern:
+    """The features `which`, a mask (n,) or rows, with their ids."""
     places = pattern.places
     return replace(
         pattern,

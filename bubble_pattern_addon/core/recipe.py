@@ -38,6 +38,7 @@ from .toml_values import (
 )
 
 INTEGRATORS = ("fire", "rk4")
+ORIENTATIONS = ("edge", "best")
 SOLVERS = ("direct", "iterate")
 KINDS = ("hole",)
 FORMATS = ("stl", "obj", "ply", "3mf", "glb")
@@ -49,19 +50,27 @@ NEAT = (1, 1.1, 1.2, 1.4, 1.6, 1.8, 2, 2.2, 2.5, 2.8, 3, 3.5, 4, 4.5, 5, 5.5, 6,
 
 @dataclass(frozen=True)
 class RegionChoice:
-    """Which faces of the base are the target region: exactly one of near, attribute, material and all."""
+    """Which faces of the base are the target region: exactly one of near, attribute, material and all.
+
+    parts: face attributes or materials whose faces are sub-regions with a first row of their own along their
+    border (what none of them names is one more); gap: what stays free between neighbouring sub-regions
+    """
 
     near: Point | None = None
     max_angle: float = 20.0
     attribute: str | None = None
     material: str | None = None
     all: bool = False
+    parts: tuple[str, ...] = ()
+    gap: float = 0.0
 
 
 @dataclass(frozen=True)
 class Packing:
     """Step 1. pitch is the packing metric: the distance of neighbouring centres.
 
+    orientation: where the rows of the arrangement run, "edge" (along the longest straight stretch of the
+    boundary), a vector, or "best" (several directions are tried)
     symmetry: "off"; "auto", whichever the region has; "x", "xy" and so on, mirrored at planes square to these
     axes of the base; "rotate 3" or "rotate 3 z", turned into itself by thirds about an axis (see
     core.isometries); symmetry_centre: a point of the planes or the axis, None for the region's own middle
@@ -70,6 +79,7 @@ class Packing:
     pitch: Described = Constant(3.0)
     edge_offset: float = 0.0
     integrator: str = "fire"
+    orientation: str | Point = "edge"
     seed: int = 0
     iterations: int = 60
     tolerance: float = 1e-3
@@ -272,6 +282,10 @@ def _refuse_unknown(data: Mapping[str, Any]) -> None:
 # -- readers: the right type or a RecipeError that names the key ---------------------------------------------
 
 
+def _orientation(value: object, where: str) -> str | Point:
+    return point(value, where) if isinstance(value, list) else text(value, where)
+
+
 def _fill(value: object, where: str) -> Fill:
     return Fill(field_from_toml(value, where))
 
@@ -296,10 +310,19 @@ def _seed(table: Mapping[str, object], where: str) -> Seed:
 
 
 READERS: dict[str, dict[str, Callable[[object, str], Any]]] = {
-    "region": {"near": point, "max_angle": number, "attribute": text, "material": text, "all": flag},
+    "region": {
+        "near": point,
+        "max_angle": number,
+        "attribute": text,
+        "material": text,
+        "all": flag,
+        "parts": texts,
+        "gap": number,
+    },
     "packing": {
         "pitch": field_from_toml,
         "edge_offset": number,
+        "orientation": _orientation,
         "integrator": text,
         "seed": whole,
         "iterations": whole,
@@ -336,6 +359,9 @@ def check_choice(choice: RegionChoice) -> None:
         raise RecipeError(f"[region] chooses faces in {len(ways)} ways ({', '.join(ways)}): keep one of them")
     if not 0 <= choice.max_angle <= 180:
         raise RecipeError(f"[region] max_angle = {choice.max_angle:g} must be from 0 to 180 degrees")
+    check_at_least(choice.gap, 0, "[region] gap")
+    if choice.gap and not choice.parts:
+        raise RecipeError("[region] gap goes between parts: name these too, or leave gap out")
 
 
 def check_recipe(recipe: Recipe) -> None:
@@ -348,6 +374,10 @@ def check_recipe(recipe: Recipe) -> None:
     if asks_for_pitch(packing.pitch):
         raise RecipeError("[packing] pitch is given as a share of itself: fill goes with diameters")
     _check_shaping(recipe.shaping)
+    if isinstance(packing.orientation, str):
+        check_one_of(packing.orientation, ORIENTATIONS, "[packing] orientation")
+    elif not any(packing.orientation):
+        raise RecipeError("[packing] orientation = [0, 0, 0] is no direction: give a vector along the rows")
     check_one_of(packing.integrator, INTEGRATORS, "[packing] integrator")
     check_at_least(packing.seed, 0, "[packing] seed")
     check_at_least(packing.iterations, 1, "[packing] iterations")

@@ -30,6 +30,8 @@ class Region:
     sheet: (R,) label of the connected part a triangle belongs to
     loops: boundary loops as rows of base vertices, the region on the left of each edge
     rim: (S, 2) every boundary edge as (region row, opposite corner), in the order of the loops
+    reserve: (S,) what the first row keeps from each of these beyond its radius: half the gap between
+    sub-regions on the borders that they share, else 0
     """
 
     base: Mesh
@@ -39,6 +41,7 @@ class Region:
     sheet: Ints
     loops: tuple[Ints, ...]
     rim: Ints
+    reserve: Floats
 
     @cached_property
     def corners(self) -> Floats:
@@ -95,8 +98,11 @@ class Region:
         return float(np.linalg.norm(end - start, axis=1).sum())
 
 
-def make_region(base: Mesh, selected: Bools) -> Region:
+def make_region(base: Mesh, selected: Bools, parts: Ints | None = None, gap: float = 0.0) -> Region:
     """Region made of the `selected` (T,) triangles of `base`.
+
+    parts: (T,) numbers of sub-regions; each is bounded by its own border, and where two meet the features
+    of both stay half the `gap` away from it; None: all is one
 
     Edges that more than two region triangles share, or that two of them run along in the same direction,
     count as boundary: bubbles do not cross them.
@@ -110,8 +116,14 @@ def make_region(base: Mesh, selected: Bools) -> Region:
     _check_geometry(welded, triangles)
     rows = welded.triangles[triangles]
     neighbours, opposite = _adjacency(rows)
+    shared = np.zeros_like(neighbours, dtype=bool)
+    if parts is not None:
+        own = parts[triangles]
+        shared = (neighbours >= 0) & (own[neighbours] != own[:, None])
+        neighbours, opposite = np.where(shared, -1, neighbours), np.where(shared, -1, opposite)
     loops, rim = _boundary_loops(rows, neighbours, opposite)
-    return Region(welded, triangles, neighbours, opposite, _sheets(neighbours), loops, rim)
+    reserve = np.where(shared[rim[:, 0], rim[:, 1]], gap / 2, 0.0)
+    return Region(welded, triangles, neighbours, opposite, _sheets(neighbours), loops, rim, reserve)
 
 
 def weld(mesh: Mesh) -> Mesh:

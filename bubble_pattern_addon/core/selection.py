@@ -45,6 +45,23 @@ def select(
     return _named(choice.material, materials, "material")
 
 
+def sub_regions(
+    choice: RegionChoice,
+    attributes: Mapping[str, Bools] = NO_NAMES,
+    materials: Mapping[str, Bools] = NO_NAMES,
+) -> Ints | None:
+    """Number of the sub-region (T,) that each triangle is in: 1 and up in the order of `choice.parts`, 0 for
+    the rest; None where the choice names no parts. Where two share a triangle the first has it.
+
+    Raises RegionError where a name is neither a face attribute nor a material.
+    """
+    if not choice.parts:
+        return None
+    known = {**materials, **attributes}
+    masks = [_named(name, known, "face attribute or material") for name in choice.parts]
+    return np.where(np.any(masks, axis=0), np.argmax(masks, axis=0) + 1, 0)
+
+
 def _named(name: str, known: Mapping[str, Bools], kind: str) -> Bools:
     if name not in known:
         match = difflib.get_close_matches(name, list(known), 1, cutoff=0.5)

@@ -187,7 +187,7 @@ def _first_hit(
     """
     triangle, distance = np.full(len(origin), -1), np.full(len(origin), np.inf)
     begin, end = origin + start[:, None] * way, origin + reach * way
-    owner, met = meeting_cylinders(build_tree(corners), begin, end, np.zeros(len(origin)))
+    owner, met = meeting_cylinders(build_tree(corners.transpose(2, 1, 0)), begin, end, np.zeros(len(origin)))
     along = _crossing(corners[met], origin[owner], way[owner])
     along[along < start[owner]] = np.inf
     order = np.lexsort((met, along, owner))

@@ -9,7 +9,7 @@ import numpy as np
 
 from . import carry
 from .check import Check, check_part
-from .closed import patch_euler
+from .closed import measure, patch_euler
 from .collision import colliding
 from .crossings import SHALLOWEST
 from .errors import BaseError, RecipeError
@@ -72,6 +72,30 @@ class Plan:
         return within & (self.fault[feature] == Fault.NONE)
 
 
+@dataclass(frozen=True)
+class Cut:
+    """What the boolean left.
+
+    mesh: its triangles on the base come first, then those the cutters made
+    face: (F,) face of the base each of the first triangles lies on
+    facet: (W,) facet of the cutters each of the others lies on
+    """
+
+    mesh: Mesh
+    face: Ints
+    facet: Ints
+
+    @property
+    def surface(self) -> Ints:
+        """Triangles on the base, (F, 3)."""
+        return self.mesh.triangles[: len(self.face)]
+
+    @property
+    def walls(self) -> Ints:
+        """Triangles that the cutters made, (W, 3)."""
+        return self.mesh.triangles[len(self.face) :]
+
+
 def part_steps(base: Mesh, pattern: Pattern, feature: Feature) -> Steps[Part]:
     """Add every feature of `pattern` to `base`; a generator of Progress that returns the Part.
 
@@ -85,9 +109,9 @@ def part_steps(base: Mesh, pattern: Pattern, feature: Feature) -> Steps[Part]:
     """
     plan = yield from plan_steps(base, pattern, feature)
     yield Progress("Cutting", 0.3)
-    mesh, facet = cut(plan)
+    left = cut(plan)
     yield Progress("Checking", 0.8)
-    part = _judge(base, feature, plan, mesh, facet)
+    part = _judge(feature, plan, left)
     yield Progress("Checking", 1.0)
     return part
 
@@ -117,12 +141,8 @@ def plan_steps(base: Mesh, pattern: Pattern, feature: Feature) -> Steps[Plan]:
     return Plan(pattern, sound, wall, fault, wall.top, bottom, cutters)
 
 
-def cut(plan: Plan) -> tuple[Mesh, Ints]:
-    """The boolean of `plan` on its base, split where many holes crowd one face.
-
-    Returns the result and the facet each of its triangles lies on, (T',), as `subtract` does. Raises
-    BaseError where the boolean fails.
-    """
+def cut(plan: Plan) -> Cut:
+    """The boolean of `plan` on its base, split where many holes crowd one face: see `subtract`."""
     wall, base = plan.wall, plan.sound.mesh
     through = np.flatnonzero(plan.meets & np.isfinite(wall.seen_axis))
     feature = wall.seen_feature[through]
@@ -132,39 +152,48 @@ def cut(plan: Plan) -> tuple[Mesh, Ints]:
     return subtract(split, piece, plan.cutters)
 
 
-def subtract(base: Mesh, face: Ints, cutters: Cutters) -> tuple[Mesh, Ints]:
+def subtract(base: Mesh, face: Ints, cutters: Cutters) -> Cut:
     """`base`, whose triangles belong to the faces `face`, (T,), less `cutters`, in one boolean.
 
-    Returns the result and the facet each of its triangles lies on, (T',): a face of the base, or -1 - a
-    facet of the cutters. Faces keep their identity through the boolean, which also keeps it from merging any
-    of the base's own edges, however flat. Raises BaseError where the boolean fails.
+    Faces keep their identity through the boolean, which also keeps it from merging any of the base's own
+    edges, however flat.
     """
+    none = np.zeros(0, dtype=np.int64)
     if len(cutters.facet) == 0:
-        return base, face
+        return Cut(base, face, none)
     first = manifold3d.Manifold.reserve_ids(2)
-    solid = _manifold(base, face, first)
-    tool = _manifold(cutters.mesh, cutters.facet, first + 1)
-    result = solid - tool
+    result = _manifold(base, face, first) - _manifold(cutters.mesh, cutters.facet, first + 1)
     if result.status() != manifold3d.Error.NoError:
         raise BaseError(f"The features could not be cut ({result.status().name}): check the base for flaws.")
     out = result.to_mesh64()
-    facet = np.array(out.face_id, dtype=np.int64)
-    ends = np.array(out.run_index, dtype=np.int64) // 3
-    from_tool = np.repeat(np.array(out.run_original_id) == first + 1, ends[1:] - ends[:-1])
-    mesh = Mesh(np.array(out.vert_properties)[:, :3], np.array(out.tri_verts, dtype=np.int64))
-    return mesh, np.where(from_tool, -1 - facet, facet)
+    # manifold3d hands these out as lists, each time anew
+    names, ends = out.run_original_id, [end // 3 for end in out.run_index]
+    identity = np.fromiter(out.face_id, dtype=np.int64, count=ends[-1])
+    triangles = out.tri_verts.view(np.int64)
+
+    def of(name: int, rows: Ints) -> list[Ints]:
+        runs = zip(names, ends[:-1], ends[1:], strict=True)
+        return [rows[start:end] for owner, start, end in runs if owner == name]
+
+    order = np.concatenate([*of(first, triangles), *of(first + 1, triangles)])
+    on_base, on_cutters = (np.concatenate([none, *of(name, identity)]) for name in (first, first + 1))
+    return Cut(Mesh(np.array(out.vert_properties), order), on_base, on_cutters)
 
 
 def _manifold(mesh: Mesh, facet: Ints, name: int) -> manifold3d.Manifold:
     """`mesh` for the boolean in double precision, every triangle marked with its `facet`, all under the id
     `name`.
     """
+
+    def given(array: np.ndarray) -> np.ndarray:
+        # manifold3d takes no array that cannot be written to
+        return np.require(array, requirements=["C", "W"])
+
     solid = manifold3d.Manifold(
         manifold3d.Mesh64(
-            # a copy, because manifold3d takes no array that cannot be written to
-            vert_properties=np.array(mesh.vertices, order="C"),
-            tri_verts=np.ascontiguousarray(mesh.triangles, dtype=np.uint64),
-            face_id=facet.astype(np.uint64),
+            vert_properties=given(mesh.vertices),
+            tri_verts=given(mesh.triangles).view(np.uint64),
+            face_id=given(facet).view(np.uint64),
             run_index=np.array([0, mesh.triangles.size], dtype=np.uint64),
             run_original_id=np.array([name], dtype=np.uint32),
         )
@@ -174,19 +203,17 @@ def _manifold(mesh: Mesh, facet: Ints, name: int) -> manifold3d.Manifold:
     return solid
 
 
-def _judge(base: Mesh, feature: Feature, plan: Plan, mesh: Mesh, facet: Ints) -> Part:
-    """The Part from the boolean's result: where its faces come from, and what can be measured on it."""
-    sound, cutters = plan.sound, plan.cutters
-    known, named = carry.same_places(sound.mesh.vertices, mesh.vertices)
-    whole, turn = carry.whole_faces(named[mesh.triangles], facet, known[sound.mesh.triangles])
-    mesh = Mesh(mesh.vertices, carry.turned(mesh.triangles, turn))
-    on_base = facet >= 0
-    source = np.empty(len(facet), dtype=np.int64)
-    source[on_base] = sound.triangle[facet[on_base]]
-    source[~on_base] = -1 - cutters.feature[-1 - facet[~on_base]]
+def _judge(feature: Feature, plan: Plan, left: Cut) -> Part:
+    """The Part from what the boolean left: where its faces come from, and what can be measured on it."""
+    sound = plan.sound
+    known, named = carry.same_places(sound.mesh.vertices, left.mesh.vertices)
+    whole, turn = carry.whole_faces(left.surface, named, left.face, known[sound.mesh.triangles])
+    mesh = Mesh(left.mesh.vertices, carry.turned(left.mesh.triangles, turn))
+    owner = plan.cutters.feature[left.facet]
+    source = np.concatenate([sound.triangle[left.face], -1 - owner])
     vertex = np.where(named >= 0, sound.vertex[named], -1)
 
-    shape = _wall_shapes(plan, mesh, facet)
+    shape = _wall_shapes(left, owner, len(plan.pattern))
     cut = plan.fault == Fault.NONE
     pierced = cut & (shape == 0)
     failures = _failures(plan)
@@ -197,12 +224,13 @@ def _judge(base: Mesh, feature: Feature, plan: Plan, mesh: Mesh, facet: Ints) ->
     if len(torn):
         state = "do not pierce one wall cleanly" if feature.depth is None else "have no clean floor and wall"
         problems.append(f"{len(torn):,} holes {state}, the first is {_place(plan.pattern, int(torn[0]))}.")
-    unchanged, notes = _unchanged(plan, mesh, facet, named, whole)
-    check = check_part(mesh, sound.mesh, int(pierced.sum()), unchanged, problems, notes)
-    return Part(mesh, source, vertex, whole, plan.wall.thickness, pierced, failures, check)
+    unchanged, notes = _unchanged(plan, left, named, whole)
+    check = check_part(measure(mesh), sound.measures, int(pierced.sum()), unchanged, problems, notes)
+    untouched = np.concatenate([whole, np.zeros(len(owner), dtype=bool)])
+    return Part(mesh, source, vertex, untouched, plan.wall.thickness, pierced, failures, check)
 
 
-def _unchanged(plan: Plan, mesh: Mesh, facet: Ints, named: Ints, whole: Bools) -> tuple[bool, list[str]]:
+def _unchanged(plan: Plan, left: Cut, named: Ints, whole: Bools) -> tuple[bool, list[str]]:
     """Is the surface the same wherever no cutter reaches? And a note where it is, but in other faces.
 
     Every face there must come out whole. Only faces narrower than what single precision in a file can hold
@@ -210,16 +238,16 @@ def _unchanged(plan: Plan, mesh: Mesh, facet: Ints, named: Ints, whole: Bools) -
     """
     base = plan.sound.mesh
     other = np.ones(len(base.triangles), dtype=bool)
-    other[facet[whole]] = False
+    other[left.face[whole]] = False
     other[plan.wall.seen_triangle[plan.meets]] = False
     changed = np.flatnonzero(other)
     if len(changed) == 0:
         return True, []
     slack = SHALLOWEST * float(np.linalg.norm(np.ptp(base.vertices, axis=0)))
-    moved = carry.drift(mesh, facet, named, changed, base)
+    moved = carry.drift(left.mesh, left.face, named, changed, base)
     if moved > slack:
         return False, []
-    lost = int((np.bincount(facet[facet >= 0], minlength=len(other))[changed] == 0).sum())
+    lost = int((np.bincount(left.face, minlength=len(other))[changed] == 0).sum())
     # faces without area are no loss worth telling
     if lost == 0 or moved < 1e-6 * slack:
         return True, []
@@ -230,16 +258,12 @@ def _unchanged(plan: Plan, mesh: Mesh, facet: Ints, named: Ints, whole: Bools) -
     ]
 
 
-def _wall_shapes(plan: Plan, mesh: Mesh, facet: Ints) -> Floats:
-    """Euler characteristic of each feature's wall and floor in the result, (n,): 0 a ring, as of a
-    through-hole; 1 a cup, as of a blind one; -1 for a feature without any.
+def _wall_shapes(left: Cut, owner: Ints, count: int) -> Floats:
+    """Euler characteristic of each feature's wall and floor in the result, (count,): 0 a ring, as of a
+    through-hole; 1 a cup, as of a blind one; -1 for a feature without any. owner: (W,) whose the walls are.
     """
-    made = facet < 0
-    owner = np.full(len(facet), -1)
-    owner[made] = plan.cutters.feature[-1 - facet[made]]
-    count = len(plan.pattern)
-    shape = patch_euler(mesh.triangles, owner, count)
-    shape[np.bincount(owner[made], minlength=count) == 0] = -1
+    shape = patch_euler(left.walls, owner, left.surface, count)
+    shape[np.bincount(owner, minlength=count) == 0] = -1
     return shape
 
 

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from .boxtree import BoxTree, build_tree
-from .closed import edge_keys, fans, is_closed, shells, signed_volumes
+from .closed import Measures, edge_keys, fans, linked, opposites, signed_volumes
 from .crossings import crossing_triangles
 from .errors import BaseError
-from .mesh import Floats, Ints, Mesh
+from .mesh import Floats, Ints, Mesh, area_columns
+from .sheets import sheets
 
 
 @dataclass(frozen=True)
@@ -24,14 +25,18 @@ class SoundBase:
     """A closed, consistently wound mesh, and where it comes from.
 
     mesh: what the boolean gets; triangle: (T,) the caller's triangle each of its triangles is; vertex: (V,)
-        likewise; tree: of the mesh's triangles
+        likewise; tree: of the mesh's triangles; measures: of the mesh
     """
 
     mesh: Mesh
     triangle: Ints
     vertex: Ints
     tree: BoxTree
+    measures: Measures
 
+
+BLOCK = 1 << 16
+"""Faces looked at together for one that has an area."""
 
 _known: dict[bytes, SoundBase] = {}
 """The base found sound last, by the digest of its arrays: a designer tries many patterns on one part."""
@@ -59,17 +64,27 @@ def sound_base(base: Mesh) -> SoundBase:
     return _known[key]
 
 
+def forget_base() -> None:
+    """Let the next base be looked through anew, for whoever measures what that costs."""
+    _known.clear()
+
+
 def _examined(base: Mesh) -> SoundBase:
     """`sound_base` of a base not seen before."""
     _check_numbers(base)
     # bodies that touch along an edge are closed as indexed, and would not be after welding
-    mesh, triangle, vertex = _without_collapsed(base, np.arange(len(base.vertices)))
-    if not is_closed(mesh.triangles):
-        mesh, triangle, vertex = _without_collapsed(base, weld(base.vertices))
-        _check_edges(mesh)
-    mesh, vertex = _without_pinches(mesh, vertex)
-    tree = build_tree(mesh.corners)
-    crossing = crossing_triangles(mesh, tree)
+    mesh, triangle, vertex = _without_collapsed(base)
+    opposite = opposites(mesh.triangles)
+    if opposite is None:
+        mesh, triangle, vertex = _without_collapsed(Mesh(base.vertices, weld(base.vertices)[base.triangles]))
+        opposite = opposites(mesh.triangles)
+    if opposite is None:
+        raise BaseError(_open_edges(mesh))
+    mesh, vertex = _without_pinches(mesh, vertex, opposite)
+    neighbour = (opposite % len(triangle)).reshape(3, -1)
+    columns = mesh.columns
+    tree = build_tree(columns)
+    crossing = crossing_triangles(mesh, columns, tree, sheets(mesh, neighbour))
     if len(crossing):
         faces = np.unique(crossing)
         place = _where(mesh.corners[crossing[:, 0]].mean(axis=1))
@@ -77,20 +92,23 @@ def _examined(base: Mesh) -> SoundBase:
             f"The base passes through itself: {len(faces):,} faces reach through one another, {place}. "
             "Unite the overlapping parts first."
         )
-    _check_orientation(mesh)
-    return SoundBase(mesh, triangle, vertex, tree)
+    shell = linked(neighbour, np.ones(neighbour.shape, dtype=bool))
+    volumes = np.bincount(shell, weights=signed_volumes(mesh))
+    _check_orientation(mesh, shell, volumes, np.sqrt((area_columns(columns) ** 2).sum(axis=0)))
+    euler = len(mesh.vertices) - len(mesh.triangles) // 2
+    return SoundBase(mesh, triangle, vertex, tree, Measures(True, euler, volumes))
 
 
-def _without_pinches(mesh: Mesh, vertex: Ints) -> tuple[Mesh, Ints]:
+def _without_pinches(mesh: Mesh, vertex: Ints, opposite: Ints) -> tuple[Mesh, Ints]:
     """Where the surface touches itself in a vertex, a vertex for each side: handles and bodies count right
     then.
     """
-    fan = fans(mesh.triangles)
+    fan = fans(mesh.triangles, opposite)
     if fan.max() + 1 == len(mesh.vertices):
         return mesh, vertex
     row = np.empty(fan.max() + 1, dtype=np.int64)
     row[fan] = mesh.triangles
-    return Mesh(mesh.vertices[row], fan.astype(np.int64)), vertex[row]
+    return Mesh(mesh.vertices[row], np.ascontiguousarray(fan)), vertex[row]
 
 
 def weld(vertices: Floats) -> Ints:
@@ -106,16 +124,19 @@ def weld(vertices: Floats) -> Ints:
     return target
 
 
-def _without_collapsed(base: Mesh, target: Ints) -> tuple[Mesh, Ints, Ints]:
-    """`base` with its vertices renamed to `target`, less the faces that collapse and the vertices nobody
-    uses, and which triangles and vertices are left.
+def _without_collapsed(base: Mesh) -> tuple[Mesh, Ints, Ints]:
+    """`base` less the faces that collapse and the vertices nobody uses, and which triangles and vertices are
+    left.
     """
-    triangles = target[base.triangles]
-    a, b, c = triangles.T
+    a, b, c = base.triangles.T
     kept = np.flatnonzero((a != b) & (b != c) & (c != a))
-    used, index = np.unique(triangles[kept], return_inverse=True)
-    mesh = Mesh(base.vertices[used], index.reshape(-1, 3).astype(np.int64))
-    return mesh, kept, used
+    triangles = base.triangles[kept]
+    named = np.zeros(len(base.vertices), dtype=bool)
+    named[triangles] = True
+    used = np.flatnonzero(named)
+    if len(used) < len(named):
+        triangles = (np.cumsum(named) - 1)[triangles]
+    return Mesh(base.vertices[used], triangles), kept, used
 
 
 def _check_numbers(base: Mesh) -> None:
@@ -129,19 +150,18 @@ def _check_numbers(base: Mesh) -> None:
             f"The base has {_count(len(bad), 'vertex', 'vertices')} whose coordinates are not numbers "
             f"(NaN or infinite), the first is vertex {bad[0]}: delete or repair it."
         )
-    if not np.any(np.abs(base.area_vectors) > 0):
+    blocks = (base.triangles[start : start + BLOCK] for start in range(0, len(base.triangles), BLOCK))
+    if not any(np.any(np.abs(Mesh(base.vertices, block).area_vectors) > 0) for block in blocks):
         raise BaseError("Every face of the base has zero area: choose a mesh that encloses a volume.")
 
 
-def _check_edges(mesh: Mesh) -> None:
-    """Raise BaseError where the surface is not closed and consistently wound."""
-    if is_closed(mesh.triangles):
-        return
-    keys, number = edge_keys(mesh.triangles)
-    edges, inverse = np.unique(keys // 2, return_inverse=True)
+def _open_edges(mesh: Mesh) -> str:
+    """Say where the surface is not closed and consistently wound."""
+    keys, bits = edge_keys(mesh.triangles)
+    edges, inverse = np.unique(keys >> 1, return_inverse=True)
     faces = np.bincount(inverse, minlength=len(edges))
-    backward = np.bincount(inverse, weights=keys % 2, minlength=len(edges))
-    middle = mesh.vertices[np.stack(np.divmod(edges, number), axis=1)].mean(axis=1)
+    backward = np.bincount(inverse, weights=keys & 1, minlength=len(edges))
+    middle = mesh.vertices[np.stack([edges >> bits, edges & ((1 << bits) - 1)], axis=1)].mean(axis=1)
     found = [
         f"{_count(int(wrong.sum()), 'edge', 'edges')} {text}, {_where(middle[wrong])}"
         for wrong, text in (
@@ -154,17 +174,16 @@ def _check_edges(mesh: Mesh) -> None:
     remedy = "close the holes" if (faces == 1).any() else "separate or remove the extra faces"
     if not (faces != 2).any():
         remedy = "recalculate the normals"
-    raise BaseError(f"The base is not a closed solid: {'; '.join(found)}. To make a part, {remedy} first.")
+    return f"The base is not a closed solid: {'; '.join(found)}. To make a part, {remedy} first."
 
 
-def _check_orientation(mesh: Mesh) -> None:
+def _check_orientation(mesh: Mesh, shell: Ints, volume: Floats, areas: Floats) -> None:
     """Raise BaseError for shells that enclose nothing, are inside out, or lie inside another body's material.
 
-    A shell round material must lie outside every other body (or in a hollow), a hollow's shell inside one.
+    shell: (T,) the triangles' shells; volume: of each, (shells,); areas: twice the triangles', (T,). A shell
+    round material must lie outside every other body (or in a hollow), a hollow's shell inside one.
     """
-    shell = shells(mesh)
-    volume = np.bincount(shell, weights=signed_volumes(mesh))
-    area = np.bincount(shell, weights=np.linalg.norm(mesh.area_vectors, axis=1))
+    area = np.bincount(shell, weights=areas)
     empty = np.flatnonzero(np.abs(volume) <= 1e-12 * area**1.5)
     probe = _probes(mesh, shell)
     depth = _depth(mesh, shell, probe)
@@ -187,13 +206,17 @@ def _check_orientation(mesh: Mesh) -> None:
 
 def _probes(mesh: Mesh, shell: Ints) -> Floats:
     """Corners of each shell that lie farthest out along x, y and z, both ways, (shells, 6, 3)."""
+    count = int(shell.max()) + 1
     owner = np.zeros(len(mesh.vertices), dtype=np.int64)
     owner[mesh.triangles] = shell[:, None]
     probes = []
     for height in np.ascontiguousarray(mesh.vertices.T):
         for way in (-height, height):
-            farthest = np.full(shell.max() + 1, -np.inf)
-            np.maximum.at(farthest, owner, way)
+            farthest = np.full(count, -np.inf)
+            if count == 1:
+                farthest[0] = way.max()
+            else:
+                np.maximum.at(farthest, owner, way)
             found = np.flatnonzero(way == farthest[owner])[::-1]
             # of several the first, which is written last
             probe = np.empty(len(farthest), dtype=np.int64)

@@ -39,7 +39,7 @@ def split_crowded(mesh: Mesh, triangle: Ints, place: Floats, room: Floats) -> tu
     # few: each of these triangles holds at least MANY features
     for which, (start, end) in zip(crowded, bounds, strict=True):
         inner = place[picked[start:end]]
-        piece = _pieces(mesh.corners[which], inner)
+        piece = _pieces(mesh.vertices[mesh.triangles[which]], inner)
         if len(piece) == 0:
             continue
         names = np.concatenate([mesh.triangles[which], count + np.arange(len(inner))])
@@ -58,7 +58,7 @@ def _picked(mesh: Mesh, triangle: Ints, place: Floats, room: Floats, holes: Ints
     edges.
     """
     ready = np.flatnonzero(holes[triangle] >= MANY)
-    corners = mesh.corners[triangle[ready]]
+    corners = mesh.vertices[mesh.triangles[triangle[ready]]]
     normal = mesh.area_vectors[triangle[ready]]
     area = np.linalg.norm(normal, axis=1)[:, None]
     along = np.roll(corners, -1, axis=1) - corners

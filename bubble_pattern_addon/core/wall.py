@@ -136,8 +136,14 @@ def _local(base: Mesh, pattern: Pattern, ids: Ints, owner: Ints, triangle: Ints)
     tangent = tangent - np.einsum("ij,ij->i", tangent, normal)[:, None] * normal
     tangent /= np.linalg.norm(tangent, axis=1)[:, None]
     frame = np.stack([tangent, np.cross(normal, tangent), normal], axis=1)
-    offset = base.vertices[base.triangles[triangle]] - pattern.position[ids][owner][:, None]
-    return np.einsum("mck,mak->mca", offset, frame[owner])
+    place = np.ascontiguousarray(base.triangles[triangle].T)
+    # a row per coordinate and corner, several times faster to work on
+    local = np.zeros((3, 3, len(owner)))
+    for axis in range(3):
+        offset = base.vertices[:, axis][place] - pattern.position[ids, axis][owner]
+        for side in range(3):
+            local[side] += offset * frame[:, side, axis][owner]
+    return local.transpose(2, 1, 0)
 
 
 @dataclass(frozen=True)
@@ -168,54 +174,57 @@ def disc_spans(local: Floats, radius: Floats) -> Spans:
     disc, where an edge crosses the circle, or at the two points of the circle along the gradient, if they
     lie in the triangle.
     """
-    flat, height = local[..., :2], local[..., 2]
-    along = np.roll(local, -1, axis=1) - local
+    # a row per corner, several times faster to work on
+    x, y, height = corners = np.ascontiguousarray(local.transpose(2, 1, 0))
+    along = corners[:, [1, 2, 0]] - corners
     low, high = np.full(len(local), np.inf), np.full(len(local), -np.inf)
 
     def take(heights: Floats, valid: Bools) -> None:
-        """Widen each span to those of its `heights` that are `valid`, both (m, k)."""
-        np.minimum(low, np.where(valid, heights, np.inf).min(axis=1), out=low)
-        np.maximum(high, np.where(valid, heights, -np.inf).max(axis=1), out=high)
+        """Widen each span to those of its `heights` that are `valid`, both (k, m)."""
+        np.minimum(low, np.where(valid, heights, np.inf).min(axis=0), out=low)
+        np.maximum(high, np.where(valid, heights, -np.inf).max(axis=0), out=high)
 
-    distance = np.einsum("mck,mck->mc", flat, flat) - radius[:, None] ** 2
+    distance = x * x + y * y - radius**2
     take(height, distance <= 0)
-    square = np.einsum("mck,mck->mc", along[..., :2], along[..., :2])
-    half = np.einsum("mck,mck->mc", along[..., :2], flat)
-    root = half**2 - square * distance
+    square = along[0] * along[0] + along[1] * along[1]
+    half = along[0] * x + along[1] * y
+    root = half * half - square * distance
     crossing = (root >= 0) & (square > 0)
     root, square = np.sqrt(np.where(crossing, root, 0)), np.where(crossing, square, 1)
-    for sign in (-1, 1):
-        share = (sign * root - half) / square
-        take(height + share * along[..., 2], crossing & (share >= 0) & (share <= 1))
+    for share in ((-root - half) / square, (root - half) / square):
+        take(height + share * along[2], crossing & (share >= 0) & (share <= 1))
 
-    plane = np.cross(along[:, 0], along[:, 1])
-    size = np.linalg.norm(plane, axis=1)
-    facing = np.where(np.abs(plane[:, 2]) > 1e-6 * size, np.sign(plane[:, 2]), 0).astype(np.int64)
-    slope = np.linalg.norm(plane[:, :2], axis=1)
-    uphill = np.where(
-        slope[:, None] > 1e-12 * size[:, None],
-        plane[:, :2] / np.maximum(slope, np.finfo(float).tiny)[:, None],
-        [1.0, 0.0],
-    )
-    for point in (radius[:, None] * uphill, -radius[:, None] * uphill):
-        found = _height_at(local, along, plane, facing, point, radius)
-        take(found[:, None], np.isfinite(found)[:, None])
-    axis = _height_at(local, along, plane, facing, np.zeros_like(uphill), radius)
+    plane = _cross(along[:, 0], along[:, 1])
+    size = np.sqrt((plane * plane).sum(axis=0))
+    facing = np.where(np.abs(plane[2]) > 1e-6 * size, np.sign(plane[2]), 0).astype(np.int64)
+    slope = np.sqrt(plane[0] * plane[0] + plane[1] * plane[1])
+    steep = slope > 1e-12 * size
+    uphill = np.where(steep, plane[:2] / np.where(steep, slope, 1), [[1.0], [0.0]])
+    for point in (radius * uphill, -radius * uphill):
+        found = _height_at(corners, along, plane, facing, point, radius)
+        take(found[None], np.isfinite(found))
+    axis = _height_at(corners, along, plane, facing, np.zeros_like(uphill), radius)
     return Spans(low, high, high >= low, facing, axis)
 
 
+def _cross(a: Floats, b: Floats) -> Floats:
+    """Cross products of vectors given as rows of coordinates, (3, m)."""
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
 def _height_at(
-    local: Floats, along: Floats, plane: Floats, facing: Ints, point: Floats, radius: Floats
+    corners: Floats, along: Floats, plane: Floats, facing: Ints, point: Floats, radius: Floats
 ) -> Floats:
-    """Height of each triangle over `point`, (m, 2); nan where the point is outside (edges count as
-    inside).
+    """Height of each triangle over `point`, (2, m); nan where the point is outside (edges count as inside).
+
+    corners, along: (3 coordinates, 3, m) corners and the edges from them; plane: (3, m) area vectors
     """
-    offset = point[:, None] - local[..., :2]
-    side = along[..., 0] * offset[..., 1] - along[..., 1] * offset[..., 0]
-    slack = 1e-9 * radius[:, None] * (np.abs(along[..., 0]) + np.abs(along[..., 1]))
-    inside = np.all(side * facing[:, None] >= -slack, axis=1) & (facing != 0)
-    fall = np.einsum("mk,mk->m", plane[:, :2], offset[:, 0])
-    return np.where(inside, local[:, 0, 2] - fall / np.where(inside, plane[:, 2], 1), np.nan)
+    x, y = point[0] - corners[0], point[1] - corners[1]
+    side = along[0] * y - along[1] * x
+    slack = 1e-9 * radius * (np.abs(along[0]) + np.abs(along[1]))
+    inside = np.all(side * facing >= -slack, axis=0) & (facing != 0)
+    fall = plane[0] * x[0] + plane[1] * y[0]
+    return np.where(inside, corners[2, 0] - fall / np.where(inside, plane[2], 1), np.nan)
 
 
 @dataclass(frozen=True)

@@ -119,7 +119,7 @@ def test_the_open_file_is_the_base_of_the_command(tmp_path: Path) -> None:
 def test_a_mesh_file_becomes_an_editable_blend(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(batch_base, "render_part", partial(batch_base.render_part, size=(120, 90)))
+    monkeypatch.setattr(batch_base, "write_picture", partial(batch_base.write_picture, size=(120, 90)))
     x, y, z = 80.0, 60.0, 4.0
     corners = np.array([[i, j, k] for k in (0, z) for j in (0, y) for i in (0, x)])
     quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]

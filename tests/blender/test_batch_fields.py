@@ -10,11 +10,15 @@ import bpy
 import numpy as np
 import pytest
 import trimesh
+from mathutils import Euler, Matrix
 
 from bubble_pattern_addon import batch
+from bubble_pattern_addon.blender import properties
+from bubble_pattern_addon.blender.pixels import read_image
 from bubble_pattern_addon.core.errors import FieldError
 from bubble_pattern_addon.core.recipe import load_recipe
-from bubble_pattern_addon.pixels import read_image
+
+from .parts import plate, points
 
 HALFTONE = (
     '[region]\nnear = [0, 0, 2]\n[packing]\npitch = 4\n[shaping.fill]\nkind = "image"\n'
@@ -89,3 +93,124 @@ def test_a_halftone_from_recipe_to_part(tmp_path: Path, capsys) -> None:
     run(tmp_path / "out" / "recipe.toml", tmp_path / "again")
     table = (tmp_path / "out" / "features.csv").read_bytes()
     assert (tmp_path / "again" / "features.csv").read_bytes() == table
+
+
+FIELDS = """
+[region]
+attribute = "front"
+[packing]
+pitch = { kind = "distance", from = 0.006, to = 0.01, distance = 0.05, objects = ["Target"] }
+[shaping]
+fill = { kind = "attribute", from = 0.3, to = 0.7, name = "Weight", falloff = "smooth" }
+[limits]
+min_diameter = 0.0035
+[output]
+blend = true
+"""
+
+
+def pattern_in(folder: Path) -> bpy.types.Object:
+    """The pattern in the .blend that a run left behind, up to date."""
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "pattern.blend"))
+    (pattern,) = [obj for obj in bpy.data.objects if obj.bubble_pattern.base is not None]
+    assert not properties.is_outdated(pattern.bubble_pattern)
+    return pattern
+
+
+def lay_anew(pattern: bpy.types.Object) -> None:
+    """Update the pattern by its own settings; nothing it depends on has changed."""
+    settings = pattern.bubble_pattern
+    prints = (settings.fingerprint, settings.size_trace)
+    assert settings.size_trace
+    bpy.ops.bubble_pattern.edit()
+    assert bpy.ops.bubble_pattern.update() == {'FINISHED'}
+    assert (settings.fingerprint, settings.size_trace) == prints
+
+
+def check_fields(at: np.ndarray, pitch: np.ndarray, size: np.ndarray) -> None:
+    """The values of FIELDS at places in the coordinates of the plate."""
+    away = np.linalg.norm(at - [0.02, 0.01, 0.005], axis=1)
+    assert np.allclose(pitch, 0.006 + 0.004 * np.clip(away / 0.05, 0, 1), rtol=0.06)
+    t = at[:, 0] / 0.1 + 0.5
+    assert np.allclose(size, pitch * (0.3 + 0.4 * t * t * (3 - 2 * t)), rtol=1e-3)
+
+
+def test_fields_of_a_blend_that_stands_askew(tmp_path: Path, capsys) -> None:
+    base = plate()
+    group = base.vertex_groups.new(name="Weight")
+    for vertex in base.data.vertices:
+        group.add([vertex.index], vertex.co.x / 0.1 + 0.5, 'REPLACE')
+    mark = base.data.attributes.new("front", 'BOOLEAN', 'FACE')
+    mark.data.foreach_set("value", [face.normal.z > 0.7 for face in base.data.polygons])
+    base.matrix_world = Matrix.LocRotScale((0.3, -0.2, 0.7), Euler((0.3, 1.2, -2.0)), (1, 1, 1))
+    target = bpy.data.objects.new("Target", None)
+    bpy.context.collection.objects.link(target)
+    target.matrix_world = base.matrix_world @ Matrix.Translation((0.02, 0.01, 0.005))
+    to_base = np.linalg.inv(np.array(base.matrix_world))
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "base.blend"))
+    (tmp_path / "recipe.toml").write_text(FIELDS)
+    arguments = [str(tmp_path / "recipe.toml"), "--base", str(tmp_path / "base.blend")]
+    assert batch.main([*arguments, "--out", str(tmp_path / "out"), "--quiet"]) == 0, capsys.readouterr().err
+    with (tmp_path / "out" / "features.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    x, y, z, size, pitch = (
+        np.array([float(r[k]) for r in rows]) for k in ("x", "y", "z", "diameter", "pitch")
+    )
+    at = np.stack([x, y, z], axis=1) @ to_base[:3, :3].T + to_base[:3, 3]
+    check_fields(at, pitch, size)
+    report = json.loads((tmp_path / "out" / "report.json").read_text())["limits"]
+    assert report["dropped"] > 0
+    pattern = pattern_in(tmp_path / "out")
+    settings = pattern.bubble_pattern
+    assert settings.pitch_field.kind == 'DISTANCE'
+    assert settings.pitch_field.object.name == "Target"
+    assert (settings.diameter_field.kind, settings.diameter_mode) == ('ATTRIBUTE', 'SHARE')
+    assert (settings.count, settings.dropped) == (len(rows), report["dropped"])
+    # the frame is another one, in which the same square may be packed otherwise
+    lay_anew(pattern)
+    assert settings.count + settings.dropped == pytest.approx(len(rows) + report["dropped"], rel=0.03)
+    at = np.array([item.vector for item in pattern.data.attributes["position"].data])
+    check_fields(at, points(pattern, "pitch"), points(pattern, "wished"))
+
+
+def test_names_that_a_blend_lacks_are_told_with_the_nearest(tmp_path: Path, capsys) -> None:
+    base = plate()
+    base.vertex_groups.new(name="Weights")
+    mark = base.data.attributes.new("front", 'BOOLEAN', 'FACE')
+    mark.data.foreach_set("value", [face.normal.z > 0.7 for face in base.data.polygons])
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "base.blend"))
+    (tmp_path / "recipe.toml").write_text(
+        FIELDS.replace("objects", "points").replace('["Target"]', "[[0,0,0]]")
+    )
+    arguments = [str(tmp_path / "recipe.toml"), "--base", str(tmp_path / "base.blend")]
+    assert batch.main([*arguments, "--out", str(tmp_path / "out"), "--quiet"]) == 1
+    assert 'did you mean "Weights"?' in capsys.readouterr().err
+
+
+def test_paint_and_pictures_of_other_files_go_into_the_blend(tmp_path: Path, capsys) -> None:
+    save_image(tmp_path / "pictures" / "ramp.png", ramp())
+    colours = np.full((8, 4), 255, dtype=np.uint8)
+    body = trimesh.creation.box((60, 40, 4))
+    colours[:, 0] = np.where(body.vertices[:, 0] > 0, 200, 100)
+    body.visual.vertex_colors = colours
+    (tmp_path / "plate.ply").write_bytes(body.export(file_type="ply"))
+    text = HALFTONE.replace(
+        "pitch = 4",
+        'pitch = { kind = "attribute", from = 3, to = 5, name = "Color", channel = "red" }',
+    )
+    (tmp_path / "recipe.toml").write_text(text + "[output]\nblend = true\n")
+    arguments = [str(tmp_path / "recipe.toml"), "--base", str(tmp_path / "plate.ply")]
+    assert batch.main([*arguments, "--out", str(tmp_path / "out"), "--quiet"]) == 0, capsys.readouterr().err
+    pattern = pattern_in(tmp_path / "out")
+    settings = pattern.bubble_pattern
+    assert settings.diameter_field.kind == 'IMAGE'
+    assert settings.diameter_field.image.packed_file is not None
+    assert settings.pitch_field.kind == 'ATTRIBUTE'
+    pitch, x = points(pattern, "pitch"), points(pattern)[:, 0]
+    assert np.allclose(pitch, 3 + 2 * (150 + 100 * x / 60) / 255, rtol=0.05)
+    names = ("position", "id", "diameter", "wished")
+    before = [points(pattern, name) for name in names]
+    lay_anew(pattern)
+    # places and paint have 32 bits in the file
+    after = [points(pattern, name) for name in names]
+    assert all(np.allclose(a, b, atol=1e-3) for a, b in zip(after, before, strict=True))

@@ -48,6 +48,7 @@ def recipes(draw: st.DrawFn) -> Recipe:
         packing=Packing(
             pitch=Constant(pitch),
             edge_offset=draw(st.floats(0, 10)),
+            orientation=draw(st.sampled_from(["edge", "best", (1.0, 0.0, -0.5)])),
             integrator=draw(st.sampled_from(["fire", "rk4"])),
             seed=draw(st.integers(0, 2**40)),
             iterations=draw(st.integers(1, 10**6)),
@@ -155,6 +156,9 @@ BAD = {
     "iterations broken": ("[packing]\niterations = 1.5", "whole number"),
     "seed": ("[packing]\nseed = -1", "at least 0"),
     "tolerance": ("[packing]\ntolerance = 0", "above 0"),
+    "gap without parts": ("[region]\nall = true\ngap = 2.0", "name these too"),
+    "orientation": ("[packing]\norientation = 'bets'", 'did you mean "best"'),
+    "orientation that is none": ("[packing]\norientation = [0, 0, 0]", "no direction"),
     "integrator": ("[packing]\nintegrator = 'rk5'", 'did you mean "rk4"'),
     "kind": ("[feature]\nkind = 'holes'", 'did you mean "hole"'),
     "depth": ("[feature]\ndepth = 0", "above 0"),

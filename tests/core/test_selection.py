@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from bubble_pattern_addon.core.errors import RecipeError, RegionError
 from bubble_pattern_addon.core.mesh import Mesh
 from bubble_pattern_addon.core.recipe import RegionChoice
-from bubble_pattern_addon.core.selection import grown, nearest_triangle, neighbour_pairs, select
+from bubble_pattern_addon.core.selection import grown, nearest_triangle, neighbour_pairs, select, sub_regions
 
 from .bases import as_mesh
 
@@ -90,3 +90,12 @@ def test_names_mean_the_faces_that_carry_them() -> None:
         select(BOX, RegionChoice())
     with pytest.raises(RegionError, match="the base has no faces"):
         select(Mesh(BOX.vertices, BOX.triangles[:0]), RegionChoice(all=True))
+
+
+def test_sub_regions_are_numbered_in_their_order_and_the_first_has_what_two_share():
+    masks = {"Centre": np.array([True, True, False, False]), "Rim": np.array([False, True, True, False])}
+    choice = RegionChoice(all=True, parts=("Rim", "Centre"))
+    assert sub_regions(choice, {"Centre": masks["Centre"]}, {"Rim": masks["Rim"]}).tolist() == [2, 1, 1, 0]
+    assert sub_regions(RegionChoice(all=True)) is None
+    with pytest.raises(RegionError, match='did you mean "Centre"'):
+        sub_regions(RegionChoice(all=True, parts=("Center",)), masks)

@@ -15,7 +15,7 @@ from bubble_pattern_addon.core.mesh import Mesh
 from bubble_pattern_addon.core.pattern import Pattern
 from bubble_pattern_addon.core.progress import drive
 from bubble_pattern_addon.core.recipe import Feature
-from bubble_pattern_addon.core.solid import Part, carry_corners, part_steps
+from bubble_pattern_addon.core.solid import Cut, Part, carry_corners, part_steps
 from tests.core.bases import (
     box,
     hexagons,
@@ -384,9 +384,9 @@ def test_a_change_where_no_hole_is_is_a_problem(monkeypatch, harm):
     whole = solid.subtract
 
     def harmed(*given):
-        mesh, facet = whole(*given)
-        vertices, triangles = mesh.vertices.copy(), mesh.triangles.copy()
-        one, other = (int(np.flatnonzero(facet == k)[0]) for k in (0, 144))
+        left = whole(*given)
+        vertices, triangles, face = left.mesh.vertices.copy(), left.surface.copy(), left.face
+        one, other = (int(np.flatnonzero(face == k)[0]) for k in (0, 144))
         if harm == "swap":
             # the other diagonal of a square that is not flat
             a, b, c, d = base_square
@@ -400,8 +400,8 @@ def test_a_change_where_no_hole_is_is_a_problem(monkeypatch, harm):
             a, b, c = triangles[one]
             triangles = np.concatenate([triangles, [[b, c, middle], [c, a, middle]]])
             triangles[one] = [a, b, middle]
-            facet = np.concatenate([facet, [facet[one]] * 2])
-        return Mesh(vertices, triangles), facet
+            face = np.concatenate([face, [face[one]] * 2])
+        return Cut(Mesh(vertices, np.concatenate([triangles, left.walls])), face, left.facet)
 
     base_square = [*base.triangles[0], base.triangles[144, 2]]
     monkeypatch.setattr(solid, "subtract", harmed)

@@ -187,7 +187,7 @@ def test_leaders_alone_are_relaxed():
 
 
 def test_a_graded_metric_is_mirrored_too():
-    graded = Linear(low=0.3, high=0.6, direction=(0.0, 1.0, 0.0))
+    graded = Linear(from_=0.3, to=0.6, direction=(0.0, 1.0, 0.0))
     _, pattern = packed(SHAPES["square"](), "x", graded)
     assert error(pattern) < EXACT
     assert np.ptp(pattern.pitch[pattern.partners], axis=1).max() == 0
@@ -258,7 +258,7 @@ def test_a_given_centre_is_used():
 
 
 def test_a_metric_without_the_symmetry_is_packed_without():
-    graded = Linear(low=0.3, high=0.6, direction=(1.0, 0.0, 0.0))
+    graded = Linear(from_=0.3, to=0.6, direction=(1.0, 0.0, 0.0))
     _, pattern = packed(SHAPES["square"](), "x", graded)
     assert pattern.symmetry is None
     assert any("pitch is not symmetric" in note and "%" in note for note in pattern.notes)

@@ -18,6 +18,8 @@ REACH = 1.5
 STIFFNESS = 12.0
 # The last phase pushes pairs apart that are closer than this share of their stable distance.
 EVEN = 0.985
+# Bubbles whose pitches differ by no more than this factor are of one size class.
+CLASS = 1.35
 # No bubble feels more others than this: on a crowded spot a dozen have room within 1.66 pitches.
 MOST_NEAR = 20
 
@@ -58,20 +60,28 @@ def find_pairs(charts: Charts, points: Floats, row: Ints, pitch: Floats, skin: f
 
     points: (n, 3) positions; row: (n,) region rows; pitch: (n,)
     """
-    at, reach, widest = (
-        signature(charts.region, points, row, float(pitch.max())),
-        REACH + skin,
-        float(pitch.max()),
-    )
-    tree = cKDTree(at, balanced_tree=False, compact_nodes=False)
-    if widest < 1.25 * pitch.min():
-        first, second = tree.query_pairs(reach * widest, output_type="ndarray").T
-    else:
-        first, second = _nearest_pairs(tree, at, np.arange(len(at)), pitch, reach)
+    at, reach = signature(charts.region, points, row, float(pitch.max())), REACH + skin
+    # Bubbles are searched for in classes of like size, so that small ones among large list no hundreds.
+    size = np.floor(np.log(pitch / pitch.min()) / np.log(CLASS)).astype(np.int64)
+    found = [_pairs_of_class(at, pitch, size, number, reach) for number in np.unique(size)]
+    first, second = np.concatenate(found, axis=1)
     stable = (pitch[first] + pitch[second]) / 2
     away = points[first] - points[second]
     close = np.einsum("mc,mc->m", away, away) < (reach * stable) ** 2
     return Pairs(first[close], second[close], stable[close])
+
+
+def _pairs_of_class(at: Floats, pitch: Floats, size: Ints, number: int, reach: float) -> Ints:
+    """Pairs (2, m) of bubbles of the class `number` of sizes with one another and with all smaller ones."""
+    own, smaller = np.flatnonzero(size == number), np.flatnonzero(size < number)
+    widest = reach * float(pitch[own].max())
+    tree = cKDTree(at[own], balanced_tree=False, compact_nodes=False)
+    among = own[tree.query_pairs(widest, output_type="ndarray").T]
+    if not len(smaller):
+        return among
+    others = cKDTree(at[smaller], balanced_tree=False, compact_nodes=False)
+    across = tree.sparse_distance_matrix(others, widest, output_type="ndarray")
+    return np.concatenate([among, [own[across["i"]], smaller[across["j"]]]], axis=1)
 
 
 def renewed_pairs(

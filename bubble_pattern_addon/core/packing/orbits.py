@@ -131,6 +131,15 @@ def settled_leaders(ground: Ground, bubbles: Bubbles) -> Bubbles:
     return Bubbles(spots.take(kept), int(kept[: bubbles.fixed].sum()))
 
 
+def orbit_sizes(ground: Ground, bubbles: Bubbles, pitch: Floats) -> Ints:
+    """How many bubbles of the whole pattern each leader stands for, itself among them, (n,)."""
+    if ground.symmetry is None:
+        return np.ones(len(bubbles), dtype=np.int64)
+    group = ground.symmetry.group
+    first = first_alike(group, positions(ground.charts, bubbles.spots), pitch)
+    return (first == np.arange(len(group))).sum(axis=1)
+
+
 def followers_of(ground: Ground, spots: Spots, pitch: Floats, reach: float | None = None) -> Followers:
     """Followers of the leaders at `spots`: all, or those within `reach` pitches of a leader.
 

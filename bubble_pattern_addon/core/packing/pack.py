@@ -10,18 +10,19 @@ from ..boundary import make_boundary, nearest_boundary, signature
 from ..errors import RegionError
 from ..mesh import Floats
 from ..metric import Constant, Field, Places
-from ..progress import Progress, Steps
+from ..progress import Progress, Steps, within
+from ..quality import measure_points
 from ..recipe import Packing
 from ..region import Region
 from ..surface import Charts, Complex, Spots, make_charts, positions, to_frame, walk
 from ..symmetry import find_symmetry
-from .bubbles import Bubbles, Ground, joined
+from .bubbles import Bubbles, Ground, can_move, joined
 from .crowding import close_pairs, uncrowded
 from .direction import smooth_directions
 from .force import STIFFNESS, stiff_law
 from .lattice import grow
 from .narrows import in_the_narrows
-from .orbits import settled_leaders, symmetric_start, with_followers
+from .orbits import orbit_sizes, settled_leaders, symmetric_start, with_followers
 from .plane import fills_its_box, lay
 from .population import control, pressed_out
 from .relax import relax
@@ -46,6 +47,11 @@ CLEAR_OF_RIM = 1.0
 LONG_ENOUGH = 6.0
 # Bubbles of the first row closer than this, as across a narrow neck, do not both fit.
 TOO_CLOSE = 0.8
+# Directions that are tried for the best arrangement, in degrees; sixty mean the same lattice.
+TURNS = (0.0, 15.0, 30.0, 45.0)
+# Where nothing holds the bubbles together they are packed at this share of the pitch that would fill the
+# surface exactly.
+CRAMPED = 1.02
 # Rounds of relaxation and population control, and how many steps each may take; the last phases' steps.
 ROUNDS = 3
 STIFF_STEPS = 45
@@ -64,9 +70,45 @@ def pack_steps(region: Region, packing: Packing) -> Steps[tuple[Ground, Bubbles]
     row = first_row(ground.track, loop_starts(ground))
     along, between = in_the_narrows(ground, _without_conflicts(ground, row))
     first = spots_on_track(charts, ground.track, along.arc) if len(along.arc) else _nobody()
-    yield Progress("Growing the lattice", 0.1)
     fixed = joined(first, between)
-    bubbles = Bubbles(joined(fixed, _lattice(ground, packing.seed)), len(fixed.row))
+    if packing.orientation == "best":
+        return ground, (yield from _best_of_several(ground, fixed, packing))
+    rows = packing.orientation if isinstance(packing.orientation, tuple) else None
+    return ground, (yield from _settled(ground, fixed, packing, *_seeds(ground, packing.seed, rows)))
+
+
+def _best_of_several(ground: Ground, fixed: Spots, packing: Packing) -> Steps[Bubbles]:
+    """The best of the arrangements whose rows start along the longest straight edge and TURNS of it."""
+    seeds, directions = _seeds(ground, packing.seed, None)
+    best, highest = Bubbles(fixed, len(fixed.row)), -np.inf
+    for number, turn in enumerate(TURNS):
+        trial = _settled(ground, fixed, packing, seeds, directions * np.exp(1j * np.radians(turn)))
+        bubbles = yield from within(trial, number / len(TURNS), (number + 1) / len(TURNS))
+        merit = _merit(ground, bubbles)
+        if merit > highest:
+            best, highest = bubbles, merit
+    return best
+
+
+def _merit(ground: Ground, bubbles: Bubbles) -> float:
+    """How good an arrangement looks: order and smallest gap, each between 0 and 1."""
+    region, spots = ground.charts.region, bubbles.spots
+    quality = measure_points(
+        positions(ground.charts, spots),
+        region.normals[spots.row],
+        local_pitch(ground, bubbles),
+        can_move(bubbles).astype(np.int64),
+        region.boundary_segments,
+    )
+    return float(np.nansum([quality.six, quality.psi6, quality.gap_min]))
+
+
+def _settled(
+    ground: Ground, fixed: Spots, packing: Packing, seeds: Spots, directions: Complex
+) -> Steps[Bubbles]:
+    """Bubbles in balance: those that are `fixed`, and a lattice from `seeds` with rows along `directions`."""
+    yield Progress("Growing the lattice", 0.1)
+    bubbles = Bubbles(joined(fixed, _lattice(ground, seeds, directions)), len(fixed.row))
     if ground.symmetry is not None:
         bubbles = symmetric_start(ground, bubbles)
     if not len(bubbles):
@@ -78,14 +120,17 @@ def pack_steps(region: Region, packing: Packing) -> Steps[tuple[Ground, Bubbles]
         yield Progress("Packing the bubbles", 0.2 + 0.2 * number)
         local = local_pitch(ground, bubbles)
         settle = relax if packing.integrator == "fire" else integrate
-        bubbles, _ = settle(ground, bubbles, local, packing.iterations, packing.tolerance)
+        bubbles, _ = settle(
+            ground, bubbles, _filling(ground, bubbles, local), packing.iterations, packing.tolerance
+        )
         bubbles, changed = control(ground, bubbles, local)
         if not changed:
             break
     yield Progress("Evening out the gaps", 0.8)
     while True:
         local = local_pitch(ground, bubbles)
-        bubbles, _ = relax(ground, bubbles, local, STIFF_STEPS, packing.tolerance, stiff_law, 1.0 + STIFFNESS)
+        size, stiffness = _filling(ground, bubbles, local), 1.0 + STIFFNESS
+        bubbles, _ = relax(ground, bubbles, size, STIFF_STEPS, packing.tolerance, stiff_law, stiffness)
         kept = ~pressed_out(ground, bubbles, local_pitch(ground, bubbles))
         if kept.all():
             break
@@ -93,7 +138,20 @@ def pack_steps(region: Region, packing: Packing) -> Steps[tuple[Ground, Bubbles]
         bubbles = Bubbles(bubbles.spots.take(kept), bubbles.fixed)
     if ground.symmetry is not None:
         bubbles = with_followers(ground, settled_leaders(ground, bubbles))
-    return ground, bubbles
+    return bubbles
+
+
+def _filling(ground: Ground, bubbles: Bubbles, local: Floats) -> Floats:
+    """The pitches (n,) at which n bubbles of the `local` ones fill a surface without a boundary.
+
+    Nothing holds them together there: whoever is missing for a full arrangement would leave the others loose
+    and uneven.
+    """
+    if ground.boundary is not None:
+        return local
+    share = orbit_sizes(ground, bubbles, local)
+    room = ground.charts.region.area / (np.sqrt(0.75) * (share * local**2).sum())
+    return local * max(CRAMPED * np.sqrt(room), 1.0)
 
 
 def local_pitch(ground: Ground, bubbles: Bubbles) -> Floats:
@@ -160,10 +218,10 @@ def _without_conflicts(ground: Ground, row: FirstRow) -> FirstRow:
     return row.take(uncrowded(pairs, rank))
 
 
-def _lattice(ground: Ground, seed: int) -> Spots:
+def _lattice(ground: Ground, seeds: Spots, directions: Complex) -> Spots:
     """Bubbles of a lattice that fills what the first row leaves free."""
     charts = ground.charts
-    seeds, directions, origin = symmetric_seeds(ground, *_seeds(ground, seed))
+    seeds, directions, origin = symmetric_seeds(ground, seeds, directions)
     uniform = ground.uniform if charts.region.flat else None
     if uniform is not None and ground.boundary is not None and fills_its_box(charts, uniform):
         clear = CLEAR_OF_RIM * uniform + ground.edge_offset
@@ -185,8 +243,9 @@ def _clear_of_rim(ground: Ground, spots: Spots) -> Spots:
     return spots.take(distance > CLEAR_OF_RIM * local + ground.edge_offset)
 
 
-def _seeds(ground: Ground, seed: int) -> tuple[Spots, Complex]:
-    """One start of the lattice for each connected part of the region, and the direction of its rows.
+def _seeds(ground: Ground, seed: int, rows: tuple[float, float, float] | None) -> tuple[Spots, Complex]:
+    """One start of the lattice for each connected part of the region, and the direction of its rows: along
+    the vector `rows` if that is given and not square to the surface there.
 
     A part with a straight edge starts there, so that lattice and first row are one; any other in its middle.
     A `seed` other than 0 turns and shifts them by chance, for another pattern of the same recipe.
@@ -205,6 +264,10 @@ def _seeds(ground: Ground, seed: int) -> tuple[Spots, Complex]:
         along = to_frame(charts, on_rim.row, tangent)
         seeds.row[sheet[best]], seeds.barycentric[sheet[best]] = on_rim
         directions[sheet[best]] = along / np.abs(along)
+    if rows is not None:
+        along = to_frame(charts, seeds.row, np.tile(rows, (len(seeds.row), 1)))
+        lies = np.abs(along) > 1e-6 * np.linalg.norm(rows)
+        directions = np.where(lies, along / np.where(lies, np.abs(along), 1.0), directions)
     if seed:
         chance = np.random.default_rng(seed)
         directions *= np.exp(1j * chance.uniform(0, np.pi / 3, len(directions)))

@@ -20,7 +20,8 @@ VOID = 0.8
 # Free bubbles nearer to the boundary than this many radii have been pressed through the first row.
 PRESSED_OUT = 2.2
 # A bubble whose overlap ratio is above this is too crowded; it is 6 in the hexagonal arrangement.
-CROWDED = 6.8
+# Where the pitch is graded, rows of fewer bubbles follow rows of more: whoever is left over goes earlier.
+CROWDED, CROWDED_GRADED = 6.8, 6.4
 # Only bubbles with less overlap than this can stand at a void.
 LONELY = 5.6
 
@@ -52,7 +53,8 @@ def control(ground: Ground, bubbles: Bubbles, pitch: Floats) -> tuple[Bubbles, i
     distance = np.linalg.norm(points[pairs.first] - points[pairs.second], axis=1)
     ratio = overlap_ratio(pairs, distance, everywhere)
     gone = pressed_out(ground, bubbles, pitch)
-    gone[m:] |= _too_crowded(pairs, distance / pairs.stable, ratio[:n], owner, m)
+    most = CROWDED if ground.uniform is not None else CROWDED_GRADED
+    gone[m:] |= _too_crowded(pairs, distance / pairs.stable, ratio[:n], owner, m, most)
     added = _voids(ground, points, row, everywhere, np.flatnonzero(ratio < LONELY))
     if not gone.any() and not len(added.row):
         return bubbles, 0
@@ -88,8 +90,8 @@ def pressed_out(ground: Ground, bubbles: Bubbles, pitch: Floats) -> Bools:
     return out
 
 
-def _too_crowded(pairs: Pairs, relative: Floats, ratio: Floats, owner: Ints, m: int) -> Bools:
-    """Free bubbles that are crowded and no neighbour of theirs is more so, among n - m free ones.
+def _too_crowded(pairs: Pairs, relative: Floats, ratio: Floats, owner: Ints, m: int, most: float) -> Bools:
+    """Which of the n - m free bubbles have an overlap ratio above `most` while no neighbour has more.
 
     relative: (p,) the pairs' distances in stable distances; ratio: (n,) overlap of the bubbles; owner: which
     of these each one in the pairs is, or is an image of
@@ -98,7 +100,7 @@ def _too_crowded(pairs: Pairs, relative: Floats, ratio: Floats, owner: Ints, m: 
     closest = np.full(len(ratio), np.inf)
     np.minimum.at(closest, first, relative)
     np.minimum.at(closest, second, relative)
-    crowded = (ratio > CROWDED) | (closest < 0.6)
+    crowded = (ratio > most) | (closest < 0.6)
     crowded[:m] = False
     rivals = crowded[first] & crowded[second] & (first != second)
     order = np.lexsort((np.arange(len(ratio)), -ratio)).argsort()

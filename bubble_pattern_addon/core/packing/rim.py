@@ -102,10 +102,10 @@ def _walked_inward(charts: Charts, boundary: Boundary, radius: Lengths) -> tuple
     at, opposite = row[owner], corner[owner]
     start = _on_edges(at, opposite, share)
     inward = 1j * (charts.corners[at, (opposite + 2) % 3] - charts.corners[at, (opposite + 1) % 3])
-    length = radius(start)
-    walked = walk(charts, start, inward / np.abs(inward) * length)
+    size = radius(start)
+    walked = walk(charts, start, inward / np.abs(inward) * (size + region.reserve[owner]))
     distance, _ = _to_boundary(charts, boundary, walked.arrived)
-    kept = (walked.left == 0) & (distance >= length * (1 - 1e-3))
+    kept = (walked.left == 0) & (distance >= size * (1 - 1e-3))
     edges = [len(loop) for loop in region.loops]
     loop = np.repeat(np.arange(len(edges)), edges)[owner]
     settled = _settled(charts, boundary, radius, walked.arrived.take(kept))

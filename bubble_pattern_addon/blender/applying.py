@@ -1,0 +1,94 @@
+"""From patterns to the part: step 3 between reading and writing Blender's data."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..core.errors import PatternError, RegionError
+from ..core.pattern import joined
+from ..core.progress import Progress, Steps
+from ..core.sides import check_one_side
+from ..core.solid import Part, part_steps
+from .generation import read_source, show_part, update_steps
+from .part_mesh import build_part_mesh
+from .pattern_object import read_pattern
+from .properties import in_scene, is_outdated, pattern_objects, recipe_of
+from .provenance import Original, read_original
+from .reading import Base, evaluated_mesh, read_base, shown
+
+
+def apply_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[tuple[bpy.types.Object, Part]]:
+    """Make the part: the base with the features of all its patterns, as an object in the base's place.
+
+    A pattern whose settings or base have changed since is laid anew first.
+
+    Raises PatternError, BaseError where the base is not fit for a solid.
+    """
+    base_object = obj.bubble_pattern.base
+    owners = pattern_objects(base_object)
+    feature = recipe_of(obj.bubble_pattern).feature
+    if any(recipe_of(owner.bubble_pattern).feature != feature for owner in owners):
+        raise PatternError(
+            f'The patterns on "{base_object.name}" have holes of different kinds: give them the same depth '
+            "and sides, or apply one, and add the other to the part"
+        )
+    for owner in owners:
+        settings = owner.bubble_pattern
+        source = read_source(base_object, settings.region, context, recipe_of(settings))
+        if feature.depth is None:
+            check_one_side(source.base.mesh, source.selected)
+        now = (source.fingerprint, source.size_trace)
+        if now != (settings.fingerprint, settings.size_trace) or is_outdated(settings):
+            yield from update_steps(owner, context)
+    base, original = read_whole(base_object, context)
+    pattern = joined([read_pattern(owner, base.mesh) for owner in owners])
+    if not len(pattern):
+        raise RegionError("The pattern has no features: make the pitch smaller or the region larger")
+    part = yield from part_steps(base.mesh, pattern, feature)
+    yield Progress("Building the part", 1.0)
+    mesh = build_part_mesh(
+        f"{base_object.name} Part", part, pattern.places, base, original, obj.bubble_pattern.wall_material
+    )
+    return place_part(base_object, owners, mesh, verdict_of(part), context), part
+
+
+def read_whole(obj: bpy.types.Object, context: bpy.types.Context) -> tuple[Base, Original]:
+    """The base `obj` with its modifiers, and all that a part of it inherits."""
+    with shown(obj, context), evaluated_mesh(obj, context.evaluated_depsgraph_get()) as mesh:
+        return read_base(obj, mesh), read_original(obj, mesh)
+
+
+def verdict_of(part: Part) -> str:
+    """What the check of the part found, in a few words for the panel."""
+    return " ".join(part.check.problems)
+
+
+def place_part(
+    base: bpy.types.Object,
+    owners: list[bpy.types.Object],
+    mesh: bpy.types.Mesh,
+    verdict: str,
+    context: bpy.types.Context,
+) -> bpy.types.Object:
+    """Let the object of the part stand where the base is, with this mesh; base and patterns are hidden."""
+    part = owners[0].bubble_pattern.part
+    if in_scene(part) and part.type == 'MESH':
+        old, part.data = part.data, mesh
+        if not old.users:
+            name = old.name
+            bpy.data.meshes.remove(old)
+            mesh.name = name
+    else:
+        part = bpy.data.objects.new(f"{base.name} Part", mesh)
+        for collection in base.users_collection:
+            collection.objects.link(part)
+    part.parent, part.parent_type, part.parent_bone = base.parent, base.parent_type, base.parent_bone
+    part.matrix_parent_inverse = base.matrix_parent_inverse
+    context.view_layer.update()
+    part.matrix_world = base.matrix_world
+    part.bubble_pattern.pattern = owners[0]
+    for owner in owners:
+        owner.bubble_pattern.part = part
+        owner.bubble_pattern.verdict = verdict
+    show_part(owners[0], context, True)
+    return part

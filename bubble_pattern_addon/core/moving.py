@@ -1,0 +1,87 @@
+"""A recipe seen from another frame: its points and directions after a rigid motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+
+from .blending import FaceSet
+from .mesh import Floats
+from .metric import Described
+from .painted import Image, mean_normal, upward
+from .recipe import Recipe
+from .region import Region
+from .toml_values import Point
+
+POINTS = {"start", "end", "centre", "near", "points", "lines"}
+DIRECTIONS = {"direction", "axis", "project", "up"}
+
+
+def moved_recipe(recipe: Recipe, matrix: Floats, region: Region) -> Recipe:
+    """The recipe that makes, on everything moved by `matrix` (4, 4), a rotation and a translation, what
+    `recipe` makes on `region`.
+    """
+    if np.array_equal(matrix, np.eye(4)):
+        return recipe
+    packing, shaping, choice = recipe.packing, recipe.shaping, recipe.region
+    orientation = packing.orientation
+    if not isinstance(orientation, str):
+        orientation = _turned(orientation, matrix)
+    seeds = tuple(replace(seed, at=_moved_point(seed.at, matrix)) for seed in shaping.seeds)
+    return replace(
+        recipe,
+        region=replace(choice, near=None if choice.near is None else _moved_point(choice.near, matrix)),
+        packing=replace(packing, pitch=moved(packing.pitch, matrix, region), orientation=orientation),
+        shaping=replace(shaping, diameter=moved(shaping.diameter, matrix, region), seeds=seeds),
+    )
+
+
+def moved(described: Described, matrix: Floats, region: Region) -> Described:
+    """The field after the motion `matrix` (4, 4) of everything; `region`: where it is before."""
+    result = _moved(described, matrix, region)
+    assert isinstance(result, Described)
+    return result
+
+
+def _moved(value: Any, matrix: Floats, region: Region) -> Any:
+    if isinstance(value, tuple):
+        return tuple(_moved(entry, matrix, region) for entry in value)
+    if not isinstance(value, (Described, FaceSet)):
+        return value
+    if isinstance(value, Image) and value.uv is None and value.up is None:
+        # upright is by an axis of the frame, which stays behind
+        sight = mean_normal(region) if value.project is None else np.array(value.project)
+        x, y, z = upward(sight / np.linalg.norm(sight)).tolist()
+        value = replace(value, up=(x, y, z))
+    parts = {}
+    for entry in fields(value):  # type: ignore[arg-type]
+        content = getattr(value, entry.name)
+        if entry.name in POINTS:
+            parts[entry.name] = _each(content, lambda point: _moved_point(point, matrix))
+        elif entry.name in DIRECTIONS:
+            parts[entry.name] = _each(content, lambda vector: _turned(vector, matrix))
+        else:
+            parts[entry.name] = _moved(content, matrix, region)
+    return replace(value, **parts)
+
+
+def _each(value: Any, change: Callable[[Point], Point]) -> Any:
+    """A point, or nested tuples of them, changed one by one; None and the name of an axis as they are."""
+    if not isinstance(value, tuple) or not value:
+        return value
+    if isinstance(value[0], tuple):
+        return tuple(_each(entry, change) for entry in value)
+    return change(value)  # type: ignore[arg-type]
+
+
+def _moved_point(point: Point, matrix: Floats) -> Point:
+    x, y, z = (matrix[:3, :3] @ np.array(point) + matrix[:3, 3]).tolist()
+    return x, y, z
+
+
+def _turned(vector: Point, matrix: Floats) -> Point:
+    x, y, z = (matrix[:3, :3] @ np.array(vector)).tolist()
+    return x, y, z
