@@ -17,7 +17,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import BaseError, OutputError
-from ..core.field_tables import Wanted, wanted, with_images
+from ..core.field_tables import NO_NAMES, Wanted, wanted, with_images
 from ..core.files import LoadedBase
 from ..core.mesh import Bools, Floats, Mesh
 from ..core.metric import Places
@@ -74,7 +74,7 @@ def registered() -> Iterator[None]:
 # -- in ------------------------------------------------------------------------------------------------------
 
 
-def read_base(path: Path | None, names: Wanted) -> LoadedBase:
+def read_base(path: Path | None, names: Wanted = NO_NAMES) -> LoadedBase:
     """The base in a .blend file, with its modifiers and in world coordinates, and of what is painted on it or
     stands beside it what `names` asks for; None: in the file that is open.
 

@@ -17,7 +17,7 @@ from ..core.pattern import all_bubbles
 from ..core.progress import drive
 from .attributes import read_values
 from .field_properties import length_property, point_of, typed
-from .operators import current_pattern, poll_pattern, refused
+from .operators import OnPattern, current_pattern, poll_pattern, refused
 from .properties import is_pattern, spoken
 
 
@@ -86,6 +86,24 @@ def fixed_rows(settings: Any, position: Floats) -> Ints:
         return np.empty(0, dtype=np.int64)
     at = np.array([seed.at[:] for seed in settings.seeds])
     return np.asarray(cKDTree(position).query(at)[1], dtype=np.int64)
+
+
+class BUBBLE_PATTERN_OT_edit_sizes(OnPattern, bpy.types.Operator):
+    """Go to Edit Mode of the pattern, where features can be selected to fix their sizes"""
+
+    bl_idname = "bubble_pattern.edit_sizes"
+    bl_label = "Edit Sizes"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        from . import generation
+
+        obj = current_pattern(context)
+        generation.show_part(obj, context, False)
+        generation.make_active(obj, context)
+        bpy.ops.object.mode_set(mode='EDIT')
+        context.tool_settings.mesh_select_mode = (True, False, False)
+        return {'FINISHED'}
 
 
 class BUBBLE_PATTERN_OT_fix_sizes(SizesOperator, bpy.types.Operator):
@@ -166,6 +184,6 @@ class BUBBLE_PATTERN_OT_free_sizes(SizesOperator, bpy.types.Operator):
         keep(settings, [(point_of(settings.seeds[n].at), settings.seeds[n].diameter) for n in kept])
 
 
-CLASSES = (BUBBLE_PATTERN_OT_fix_sizes, BUBBLE_PATTERN_OT_free_sizes)
+CLASSES = (BUBBLE_PATTERN_OT_edit_sizes, BUBBLE_PATTERN_OT_fix_sizes, BUBBLE_PATTERN_OT_free_sizes)
 
 register, unregister = bpy.utils.register_classes_factory(CLASSES)

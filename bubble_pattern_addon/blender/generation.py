@@ -23,7 +23,7 @@ from ..core.progress import Progress, Steps, drive
 from ..core.quality import Quality, measure, min_margin, min_web, open_area
 from ..core.recipe import Recipe, RegionChoice, default_recipe, recipe_from_dict
 from ..core.region import Region, make_region
-from ..core.selection import select
+from ..core.selection import select, sub_regions
 from ..core.shaping import reshaped
 from ..core.surroundings import Surroundings
 from .marked_side import on_marked_side
@@ -86,14 +86,16 @@ def read_source(
         base = read_base(obj, mesh)
         painted = read_painted(obj, mesh, base, names)
     surroundings = with_things(painted, names, base.frame, context)
+    choice = RegionChoice(attribute=attribute) if recipe is None else recipe.region
     selected = select(base.mesh, RegionChoice(attribute=attribute), base.attributes)
     selected = on_marked_side(obj, base, attribute, selected)
+    parts = sub_regions(choice, base.attributes, base.materials)
     return Source(
         base,
-        make_region(base.mesh, selected),
+        make_region(base.mesh, selected, parts, choice.gap),
         selected,
         surroundings,
-        base.fingerprint(selected) + trace(surroundings, pitch_names),
+        base.fingerprint(selected, parts) + trace(surroundings, pitch_names),
         trace(surroundings, size_names),
     )
 

@@ -123,6 +123,9 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
         else:
             layout.label(text=obj.name, icon='MOD_PARTICLE_INSTANCE')
         outdated = bool(settings.trouble) or is_outdated(settings)
+        if is_pattern(context.active_object) and context.mode == 'EDIT_MESH':
+            self.draw_points(layout, settings)
+            return
         editing = context.mode == 'EDIT_MESH'
         row = (large(layout) if editing else layout).row(align=True)
         if editing:
@@ -141,6 +144,14 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
             "bubble_pattern.apply", icon='CHECKMARK'
         )
         layout.operator("bubble_pattern.remove", icon='TRASH')
+
+    def draw_points(self, layout: bpy.types.UILayout, settings: Any) -> None:
+        """The points of the pattern are being edited: sizes can be fixed."""
+        count = settings.id_data.data.total_vert_sel
+        text = f"{count:,} feature{'s' if count != 1 else ''} selected" if count else "Select features"
+        layout.label(text=text, icon='VERTEXSEL')
+        large(layout).operator("bubble_pattern.fix_sizes", icon='PINNED')
+        layout.operator("bubble_pattern.free_sizes", icon='UNPINNED')
 
     def draw_applied(
         self, context: bpy.types.Context, layout: bpy.types.UILayout, obj: bpy.types.Object
@@ -171,6 +182,9 @@ class BUBBLE_PATTERN_PT_packing(SettingsPanel, bpy.types.Panel):
         if settings.orientation == 'GIVEN':
             column.prop(settings, "rows_along", text=" ")
         column.prop(settings, "seed")
+        column.prop(settings, "parts")
+        if settings.parts:
+            column.prop(settings, "gap")
 
 
 class BUBBLE_PATTERN_PT_solver(SettingsPanel, bpy.types.Panel):
@@ -195,8 +209,12 @@ class BUBBLE_PATTERN_PT_holes(SettingsPanel, bpy.types.Panel):
         draw_field(column, settings, "fill" if share else "diameter", "diameter_field", share, "Diameter")
         column.row().prop(settings, "diameter_mode", text=" ", expand=True)
         row = column.row(align=True)
-        row.operator("bubble_pattern.fix_sizes", icon='PINNED')
-        row.operator("bubble_pattern.free_sizes", icon='UNPINNED')
+        if context.mode == 'OBJECT':
+            row.operator("bubble_pattern.edit_sizes", icon='PINNED')
+        else:
+            row.operator("bubble_pattern.fix_sizes", icon='PINNED')
+        if settings.seeds:
+            row.operator("bubble_pattern.free_sizes", text="Free", icon='UNPINNED')
         if settings.seeds:
             column.label(text=f"{len(settings.seeds):,} fixed", icon='PINNED')
             column.prop(settings, "solver")

@@ -105,6 +105,18 @@ class BubblePatternSettings(bpy.types.PropertyGroup):
         name="Region",
         description="Face attribute of the base that marks the target region",
     )
+    parts: StringProperty(
+        name="Sub-Regions",
+        description="Face attributes or materials, separated by commas, whose faces get their own first row",
+        update=repack,
+    )
+    gap: length_property(
+        name="Gap",
+        description="What stays free between neighboring sub-regions",
+        default=0.0,
+        min=0.0,
+        update=repack,
+    )
     pitch: length_property(
         name="Pitch",
         description="Distance between the centers of neighboring features",
@@ -186,7 +198,7 @@ class BubblePatternSettings(bpy.types.PropertyGroup):
         description="How the size of the features is given",
         items=(
             ('SIZE', "Size", "As a diameter"),
-            ('SHARE', "Share of Pitch", "Relative to the pitch there: large features where it is wide"),
+            ('SHARE', "Share", "Relative to the pitch there: large features where it is wide"),
         ),
         default='SIZE',
         update=reshape,
@@ -325,7 +337,11 @@ def recipe_of(settings: Any) -> Recipe:
     """The recipe that `settings` stand for. Raises RecipeError where they contradict one another."""
     through = settings.depth_mode == 'THROUGH'
     recipe = Recipe(
-        region=RegionChoice(attribute=settings.region or None),
+        region=RegionChoice(
+            attribute=settings.region or None,
+            parts=(parts := tuple(name.strip() for name in settings.parts.split(",") if name.strip())),
+            gap=typed(settings.gap) if parts else 0.0,
+        ),
         packing=Packing(
             pitch=described(settings.pitch_field, settings.pitch, False, "[packing] pitch"),
             edge_offset=typed(settings.edge_offset),
@@ -371,6 +387,8 @@ def diameter_of(settings: Any) -> Described:
 def take_recipe(settings: Any, recipe: Recipe) -> None:
     """Set `settings` to what `recipe` says."""
     live, settings.live = settings.live, False  # one change after the other would lay a pattern each time
+    settings.parts = ", ".join(recipe.region.parts)
+    settings.gap = recipe.region.gap
     take_packing(settings, recipe.packing)
     take_shaping(settings, recipe.shaping)
     feature = recipe.feature

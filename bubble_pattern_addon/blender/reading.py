@@ -53,10 +53,11 @@ class Base:
         """(4, 4) from the frame to the object's coordinates."""
         return np.linalg.inv(self.to_frame)
 
-    def fingerprint(self, selected: Bools) -> str:
-        """A short name for this very geometry with this target region."""
+    def fingerprint(self, selected: Bools, parts: Ints | None = None) -> str:
+        """A short name for this very geometry with this target region and its sub-regions (T,)."""
         digest = hashlib.blake2b(digest_size=16)
-        for array in (self.mesh.vertices, self.mesh.triangles, selected):
+        arrays = [self.mesh.vertices, self.mesh.triangles, selected]
+        for array in arrays if parts is None else [*arrays, parts]:
             digest.update(np.ascontiguousarray(array).tobytes())
         return digest.hexdigest()
 

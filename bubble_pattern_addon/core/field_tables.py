@@ -165,6 +165,9 @@ class Wanted:
     objects: frozenset[str] = frozenset()
 
 
+NO_NAMES = Wanted()
+
+
 def wanted(*described: Described) -> Wanted:
     """All names that these fields ask for, so that a caller fetches these and no others."""
     parts = [part for field in described for part in _parts(field)]

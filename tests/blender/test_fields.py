@@ -347,7 +347,7 @@ def test_a_recipe_goes_to_the_settings_and_back(table: Any) -> None:
     given = field_from_toml(table, "here")
     for diameter in (given, Fill(field_from_toml(replaced(table), "here"))):
         recipe = Recipe(
-            region=RegionChoice(attribute="bubble_region"),
+            region=RegionChoice(attribute="bubble_region", parts=("Left", "Front"), gap=0.002),
             packing=Packing(pitch=given, orientation=(0.0, 1.0, 0.25)),
             shaping=Shaping(diameter, seeds=(Seed((0.25, 0.5, 1.0), 0.002),), solver="iterate"),
         )
@@ -452,6 +452,31 @@ def test_points_deleted_by_hand_stay_away_when_sizes_change() -> None:
     assert np.allclose(
         sizes(pattern), SMALL + (LARGE - SMALL) * (local(pattern)[:, 0] / 0.1 + 0.5), atol=2e-7
     )
+
+
+def test_sub_regions_have_a_first_row_each_and_a_gap_between() -> None:
+    base = panel()
+    left = base.data.attributes.new("Left", 'BOOLEAN', 'FACE')
+    left.data.foreach_set("value", [face.center.x < 0 for face in base.data.polygons])
+    pattern = add_on_top(base)
+    settings = pattern.bubble_pattern
+    assert (np.abs(local(pattern)[:, 0]) < settings.pitch / 4).any()
+    settings.parts = "Left"
+    assert not settings.trouble
+    assert np.abs(local(pattern)[:, 0]).min() > 0.45 * settings.pitch
+    settings.gap = 0.01
+    assert np.abs(local(pattern)[:, 0]).min() > 0.45 * settings.pitch + 0.005
+    settings.parts = "Lefts"
+    assert "Left" in settings.trouble
+    # other faces in the sub-region are another pattern
+    settings.parts = "Left"
+    before = local(pattern)
+    left = base.data.attributes["Left"]
+    left.data.foreach_set("value", [face.center.x < 0.05 for face in base.data.polygons])
+    base.data.update_tag()
+    activate(base)
+    assert bpy.ops.bubble_pattern.apply() == {'FINISHED'}
+    assert len(local(pattern)) != len(before) or not np.allclose(local(pattern), before)
 
 
 # -- fixed sizes ---------------------------------------------------------------------------------------------
@@ -653,7 +678,15 @@ def test_the_sidebar_shows_what_a_kind_needs() -> None:
         drawn = []
         cls.draw(SimpleNamespace(layout=Layout(drawn), fields=()), bpy.context)
         assert drawn
-    assert {"bubble_pattern.fix_sizes", "bubble_pattern.free_sizes", "diameter_mode"} <= set(drawn)
+    assert {"bubble_pattern.edit_sizes", "diameter_mode"} <= set(drawn)
+    assert bpy.ops.bubble_pattern.edit_sizes() == {'FINISHED'}
+    assert pattern.mode == 'EDIT'
+    assert bpy.context.active_object == pattern
+    assert tuple(bpy.context.tool_settings.mesh_select_mode) == (True, False, False)
+    drawn = []
+    main = SimpleNamespace(layout=Layout(drawn), draw_points=panels.BUBBLE_PATTERN_PT_main.draw_points)
+    main.draw_points(main, main.layout, settings)
+    assert drawn == ["bubble_pattern.fix_sizes", "bubble_pattern.free_sizes"]
 
 
 def test_names_and_tooltips_of_fields_are_as_blender_has_them() -> None:
