@@ -1,7 +1,8 @@
 """Measure packing and adding against their peers in one run and print markdown tables.
 
-Ours and its peer run in turn, so that a busy machine slows both; seconds are medians, a ratio is ours by the
-peer's. Peers come with the extra `benchmark`; one that is not installed is left out with a line that says so.
+Ours and its peer run in turn, so that a busy machine slows both; a ratio is ours by the peer's. Seconds are
+medians in packing, and the least in adding, whose peers work on all cores and suffer most from a busy one.
+Peers come with the extra `benchmark`; one that is not installed is left out with a line that says so.
 
 Example: python scripts/benchmark.py --only flat curved
 """
@@ -44,6 +45,7 @@ from scripts.shapes import SHAPES, Shape, circle, curved_slab, plate, rectangle_
 
 ENOUGH = 12.0
 """Seconds of one measurement after which it is not repeated any more."""
+HOLE = Feature(kind="hole", sides=32)
 
 
 @dataclass(frozen=True)
@@ -92,6 +94,32 @@ def in_turn(runs: list[Callable[[], float]], repeats: int) -> list[float]:
             if sum(taken) < ENOUGH:
                 taken.append(run())
     return [statistics.median(taken) for taken in seconds]
+
+
+@dataclass(frozen=True)
+class Taken:
+    """Seconds on the clock, and of all cores together."""
+
+    clock: float
+    cores: float
+
+
+def timed(run: Callable[[], object]) -> Taken:
+    """What one run takes."""
+    clock, cores = time.perf_counter(), time.process_time()
+    run()
+    return Taken(time.perf_counter() - clock, time.process_time() - cores)
+
+
+def least(runs: list[Callable[[], Taken]], repeats: int) -> list[Taken]:
+    """The least that each run takes; they take turns, `repeats` times or until one has taken ENOUGH."""
+    found: list[list[Taken]] = [[] for _ in runs]
+    for _ in range(repeats):
+        for run, taken in zip(runs, found, strict=True):
+            taken.append(run())
+        if max(sum(one.clock for one in taken) for taken in found) > ENOUGH:
+            break
+    return [Taken(min(one.clock for one in taken), min(one.cores for one in taken)) for taken in found]
 
 
 def uniform(pitch: float) -> Recipe:
@@ -182,7 +210,8 @@ def flat(repeats: int) -> None:
             grid = peers.clipped_grid(outlines[name], shape.pitch)
             region = make_region(shape.mesh, shape.selected)
             print_rows([peer_row(name, "clipped hexagonal grid", grid, region, grid.seconds)])
-    print(f"\nPeak memory of a process that packs the trapezoid finely: {peak_memory('trapezoid', 0.295)}")
+    peak = peak_memory("--pack-once", "trapezoid", "0.295")
+    print(f"\nPeak memory of a process that packs the trapezoid finely: {peak}")
 
 
 def curved(repeats: int) -> None:
@@ -243,42 +272,69 @@ def packed_in(region: Region, recipe: Recipe) -> float:
 def adding(repeats: int) -> None:
     """`part_steps` with everything it does against the bare subtraction of the same cutters."""
     print(
-        "\n## Adding\n\n32-sided through-holes; ours with all checks, of a base not seen before; bare: the "
-        "subtraction alone, both solids built beforehand."
+        "\n## Adding\n\n32-sided through-holes. Ours: everything, the base looked through for the first "
+        "time; again: the same\nbase once more, known to be sound. Bare: the subtraction alone, both solids "
+        "built beforehand; built: with their\nbuilding. Seconds are the least of several runs in turn; ratio: "
+        "ours by bare; cores: the same in seconds of all\ncores together."
     )
-    print_head("| base | triangles | holes | ours, s | bare, s | ratio | watertight | genus | problems |")
+    print_head(
+        "| base | triangles | holes | ours, s | again, s | bare, s | built, s | ratio | cores "
+        "| again by bare | ours by built | peak, ours | peak, built | watertight | genus | problems |"
+    )
     for name, shape, pitch in adding_cases():
         add(name, shape, pitch, repeats)
 
 
 def adding_cases() -> list[tuple[str, Shape, float]]:
-    """Bases for adding, with the pitch that gives about 1,000, 10,000 and 10,000 holes."""
+    """Bases for adding, with the pitch that gives about 1,000 holes or 10,000."""
     return [
         ("curved slab", curved_slab(), 6.5),
         ("curved slab", curved_slab(), 2.15),
         ("flat plate, two-triangle faces", plate(300.0, 300.0, 3.0, 3.22), 3.22),
+        ("curved slab, scan-fine", curved_slab(400), 6.5),
     ]
+
+
+def cutters_of(shape: Shape, pattern: Pattern) -> Mesh:
+    """What is cut out of a base."""
+    return drive(plan_steps(shape.mesh, pattern, HOLE)).cutters.mesh
 
 
 def add(name: str, shape: Shape, pitch: float, repeats: int) -> None:
     """One line of the table of adding."""
     pattern = pack(shape, pitch)[0]
-    feature = Feature(kind="hole", sides=32)
-    cutters = drive(plan_steps(shape.mesh, pattern, feature)).cutters.mesh
+    cutters = cutters_of(shape, pattern)
     parts: list[Part] = []
 
-    def ours() -> float:
-        forget_base()
-        start = time.perf_counter()
-        parts[:] = [drive(part_steps(shape.mesh, pattern, feature))]
-        return time.perf_counter() - start
+    def again() -> None:
+        parts[:] = [drive(part_steps(shape.mesh, pattern, HOLE))]
 
-    mine, bare = in_turn([ours, partial(bare_subtract, shape.mesh, cutters)], repeats)
+    def first() -> Taken:
+        forget_base()
+        return timed(again)
+
+    def bare() -> Taken:
+        solids = as_manifold(shape.mesh), as_manifold(cutters)
+        return timed(lambda: (solids[0] - solids[1]).to_mesh64())
+
+    def built() -> Taken:
+        return timed(lambda: (as_manifold(shape.mesh) - as_manifold(cutters)).to_mesh64())
+
+    ours, known, alone, whole = least([first, lambda: timed(again), bare, built], repeats)
     check = parts[0].check
+    seconds = (one.clock for one in (ours, known, alone, whole))
+    ratios = (
+        ours.clock / alone.clock,
+        ours.cores / alone.cores,
+        known.clock / alone.clock,
+        ours.clock / whole.clock,
+    )
+    figures = [*(f"{value:.2f}" for value in seconds), *(f"**{value:.2f}**" for value in ratios)]
+    peaks = [peak_memory("--add-once", name, str(pitch), way) for way in ("ours", "bare")]
     print(
         f"| {name} | {len(shape.mesh.triangles):,} | {check.through:,} of {len(pattern):,} "
-        f"| {mine:.2f} | {bare:.2f} | **{mine / bare:.2f}** | {check.watertight} "
-        f"| {check.genus:,} | {len(check.problems)} |",
+        f"| {' | '.join(figures)} | {' | '.join(peaks)} | {check.watertight} | {check.genus:,} "
+        f"| {len(check.problems)} |",
         flush=True,
     )
 
@@ -289,42 +345,36 @@ def blender(repeats: int) -> None:
         return
     from scripts import peers_blender as inside
 
-    print(f"\n## Adding in Blender {inside.version()}\n\nFrom the object to the new mesh, same cutters.")
-    print_head("| base | holes | ours, s | modifier, s | ratio | faces, ours | faces, modifier |")
+    print(
+        f"\n## Adding in Blender {inside.version()}\n\nFrom the object to the new mesh, same cutters; ours "
+        "with the base looked through for the first time.\nSeconds are the least of several runs in turn; "
+        "cores: the ratio in seconds of all cores together."
+    )
+    print_head("| base | holes | ours, s | modifier, s | ratio | cores | faces, ours | faces, modifier |")
     for name, shape, pitch in adding_cases():
         inside.clear()
         base_object = inside.place(shape.mesh, "base")
         assert inside.unchanged(base_object, shape.mesh)
         read = Shape(inside.read(base_object).mesh, shape.selected, pitch)
         pattern = pack(read, pitch)[0]
-        feature = Feature(kind="hole", sides=32)
-        cutters = drive(plan_steps(read.mesh, pattern, feature)).cutters.mesh
-        cutter_object = inside.place(cutters, "cutters")
+        cutter_object = inside.place(cutters_of(read, pattern), "cutters")
         faces = [0, 0]
 
-        def ours(given: tuple[Any, ...] = (base_object, pattern, feature), faces: list[int] = faces) -> float:
-            seconds, faces[0] = inside.ours(*given)
-            return seconds
+        def ours(given: tuple[Any, ...] = (base_object, pattern, HOLE), faces: list[int] = faces) -> Taken:
+            forget_base()
+            return timed(lambda: faces.__setitem__(0, inside.ours(*given)))
 
-        def theirs(given: tuple[Any, ...] = (base_object, cutter_object), faces: list[int] = faces) -> float:
-            seconds, faces[1] = inside.modifier(*given)
-            return seconds
+        def theirs(given: tuple[Any, ...] = (base_object, cutter_object), faces: list[int] = faces) -> Taken:
+            return timed(lambda: faces.__setitem__(1, inside.modifier(*given)))
 
-        mine, other = in_turn([ours, theirs], repeats)
+        mine, other = least([ours, theirs], repeats)
         print(
-            f"| {name} | {len(pattern):,} | {mine:.2f} | {other:.2f} | **{mine / other:.2f}** "
+            f"| {name} | {len(pattern):,} | {mine.clock:.2f} | {other.clock:.2f} "
+            f"| **{mine.clock / other.clock:.2f}** | **{mine.cores / other.cores:.2f}** "
             f"| {faces[0]:,} | {faces[1]:,} |",
             flush=True,
         )
     inside.clear()
-
-
-def bare_subtract(base: Mesh, cutters: Mesh) -> float:
-    """Seconds of one subtraction of the composed cutters and of reading its result."""
-    solid, tool = as_manifold(base), as_manifold(cutters)
-    start = time.perf_counter()
-    (solid - tool).to_mesh64()
-    return time.perf_counter() - start
 
 
 def as_manifold(mesh: Mesh) -> manifold3d.Manifold:
@@ -334,22 +384,37 @@ def as_manifold(mesh: Mesh) -> manifold3d.Manifold:
     )
 
 
-def peak_memory(name: str, pitch: float) -> str:
-    """Largest resident size of a process of its own that packs one shape."""
+def peak_memory(*arguments: str) -> str:
+    """Largest resident size of a process of its own that does one thing."""
     if find_spec("resource") is None:
         return "not measured (this system does not tell)"
-    command = [sys.executable, str(Path(__file__).resolve()), "--pack-once", name, str(pitch)]
+    command = [sys.executable, str(Path(__file__).resolve()), *arguments]
     return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
+
+
+def own_peak() -> float:
+    """Largest resident size of this process so far, in MiB."""
+    import resource
+
+    unit = 1 if sys.platform == "darwin" else 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 2**20
 
 
 def pack_once(name: str, pitch: float) -> None:
     """Pack one shape and print the process's peak memory."""
-    import resource
-
     pattern, _, seconds = pack(SHAPES[name](), pitch)
-    unit = 1 if sys.platform == "darwin" else 1024
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 2**20
-    print(f"{peak:,.0f} MiB for {len(pattern):,} features in {seconds:.2f} s")
+    print(f"{own_peak():,.0f} MiB for {len(pattern):,} features in {seconds:.2f} s")
+
+
+def add_once(name: str, pitch: float, ours: bool) -> None:
+    """Add one pattern, or subtract its cutters barely, and print the process's peak memory."""
+    shape = next(shape for known, shape, size in adding_cases() if (known, size) == (name, pitch))
+    pattern = pack(shape, pitch)[0]
+    if ours:
+        drive(part_steps(shape.mesh, pattern, HOLE))
+    else:
+        (as_manifold(shape.mesh) - as_manifold(cutters_of(shape, pattern))).to_mesh64()
+    print(f"{own_peak():,.0f} MiB")
 
 
 def installed(module: str) -> bool:
@@ -377,11 +442,15 @@ def main() -> None:
     parser.add_argument(
         "--only", nargs="+", choices=list(SECTIONS), default=list(SECTIONS), metavar="SECTION"
     )
-    parser.add_argument("--repeats", type=int, default=5, help="runs of which the median counts (default 5)")
+    parser.add_argument("--repeats", type=int, default=5, help="runs of each (default 5)")
     parser.add_argument("--pack-once", nargs=2, metavar=("SHAPE", "PITCH"), help=argparse.SUPPRESS)
+    parser.add_argument("--add-once", nargs=3, metavar=("BASE", "PITCH", "WAY"), help=argparse.SUPPRESS)
     chosen = parser.parse_args()
     if chosen.pack_once:
         pack_once(chosen.pack_once[0], float(chosen.pack_once[1]))
+        return
+    if chosen.add_once:
+        add_once(chosen.add_once[0], float(chosen.add_once[1]), chosen.add_once[2] == "ours")
         return
     for section in chosen.only:
         SECTIONS[section](chosen.repeats)

@@ -6,8 +6,7 @@ Makes its own environment on first use. Every result gets a folder in DIR (defau
 
     base.blend      the base, its target region and sub-regions marked
     recipe.toml     the recipe (from scripts/gallery), every value written out
-    pattern.blend   opens with the pattern editable, and the part; where the sidebar cannot show the
-                    recipe, part.blend with base and part instead
+    pattern.blend   opens with the pattern editable
     part.stl, features.csv, report.json, part.png
 
 Beside the folders stand small pictures, NAME.jpg, and all of them on one sheet, contact_sheet.jpg.
@@ -129,14 +128,18 @@ def make(name: str, folder: Path, size: tuple[int, int], show: Callable[[Progres
     """
     from bubble_pattern_addon import batch
     from bubble_pattern_addon.blender import batch_base
+    from bubble_pattern_addon.core.field_tables import wanted
     from bubble_pattern_addon.core.files import output_folder
     from bubble_pattern_addon.core.progress import Progress, drive, within
+    from bubble_pattern_addon.core.recipe import load_recipe
     from scripts.progress_bar import follow_rendering
 
     show(Progress("Modelling", 0.0))
     with output_folder(folder) as files:
         write_base_of(name, files / "base.blend")
-        base = batch_base.read_base(files / "base.blend")
+        recipe = load_recipe(RECIPES / f"{name}.toml")
+        names = wanted(recipe.packing.pitch, recipe.shaping.diameter)
+        base = batch_base.read_base(files / "base.blend", names)
         steps = within(batch.run_steps(base, RECIPES / f"{name}.toml"), 0.05, 0.4)
         run = drive(steps, show)
         output = replace(run.recipe.output, blend=True, picture=True)
@@ -167,38 +170,12 @@ def taking_pictures(size: tuple[int, int]) -> BlenderSide:
     import numpy as np
 
     from bubble_pattern_addon.blender import batch_base
-    from bubble_pattern_addon.core.errors import RecipeError
 
     def write_picture(path: Path, run: Run) -> None:
         batch_base.write_picture(path, run, size, up=np.array([0.0, 0.0, 1.0]))
 
-    def write_blend(path: Path, run: Run) -> None:
-        try:
-            batch_base.write_blend(path, run)
-        except RecipeError:  # a recipe that the sidebar cannot show, so that no pattern could be edited there
-            batch_base.read_base(path.with_name("base.blend"))  # without what was begun
-            write_part(path.with_name("part.blend"), run)
-
-    side = SimpleNamespace(write_blend=write_blend, write_picture=write_picture)
+    side = SimpleNamespace(write_blend=batch_base.write_blend, write_picture=write_picture)
     return cast("BlenderSide", side)
-
-
-def write_part(path: Path, run: Run) -> None:
-    """A .blend with the base, hidden, and the part."""
-    import bpy
-
-    from bubble_pattern_addon.blender import batch_base
-    from bubble_pattern_addon.blender.part_mesh import build_part_mesh
-
-    base_obj, base, original = batch_base.stand_base(run)
-    mesh = build_part_mesh(f"{base_obj.name} Part", run.part, run.pattern.places, base, original)
-    part = bpy.data.objects.new(mesh.name, mesh)
-    part.matrix_world = base_obj.matrix_world
-    bpy.context.scene.collection.objects.link(part)
-    base_obj.hide_set(True)
-    base_obj.hide_render = True
-    bpy.context.view_layer.objects.active = part
-    bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True, copy=True)
 
 
 def write_small_pictures(out: Path, names: Sequence[str]) -> None:

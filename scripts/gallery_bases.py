@@ -24,8 +24,8 @@ FINISHES: Mapping[str, Mapping[str, Any]] = {
     "Black plastic": {"color": (0.018, 0.019, 0.021), "roughness": 0.42, "grain": 0.03, "grain_size": 0.5},
     "Anthracite": {"color": (0.045, 0.048, 0.054), "roughness": 0.40},
     "Light plastic": {"color": (0.56, 0.57, 0.57), "roughness": 0.45, "grain": 0.02, "grain_size": 0.5},
-    "Aluminium": {"color": (0.36, 0.37, 0.39), "metallic": 0.8, "roughness": 0.40},
-    "Bronze": {"color": (0.34, 0.27, 0.21), "metallic": 0.8, "roughness": 0.40},
+    "Aluminium": {"color": (0.36, 0.37, 0.39), "metallic": 0.8, "roughness": 0.42},
+    "Bronze": {"color": (0.34, 0.27, 0.21), "metallic": 0.8, "roughness": 0.52},
     "Chrome": {"color": (0.62, 0.63, 0.65), "metallic": 1.0, "roughness": 0.2},
     "Display": {"color": (0.004, 0.005, 0.007), "roughness": 0.12},
     "Keys": {"color": (0.20, 0.21, 0.225), "roughness": 0.5},
@@ -105,11 +105,11 @@ def coupe_speaker() -> GalleryBase:
     """Result 2: a round centre over the cone, and surroundings to its left and right."""
     region = rounded(np.array([[-108.0, -50.0], [100.0, -58.0], [112.0, 52.0], [-92.0, 58.0]]), 44.0)
     centre = circle(42.0, (4.0, 0.0))
-    rings = (-12.0, -10.5, -9.0, -7.5, -6.0, -4.5, -3.0, -1.5, 1.5, 3.0)
+    rings = (-16.5, -15.0, -13.5, -12.0, -10.5, -9.0, -7.5, -6.0, -4.5, -3.0, -1.5, 1.5, 3.0)
     cover = _speaker(
         region,
         [Contour(centre, rings)],
-        lambda flat: 3.2 * smooth((44 - np.linalg.norm(flat - [4.0, 0.0], axis=1)) / 13),
+        lambda flat: 2.8 * smooth((44 - np.linalg.norm(flat - [4.0, 0.0], axis=1)) / 16),
     )
     grille, inner = cover.within(region), cover.within(centre)
     left = np.zeros_like(grille)
@@ -194,7 +194,7 @@ def desk_phone() -> GalleryBase:
         return rise * flat[:, 1] - flat[:, 1] ** 2 / 2600 + 1.2 * smooth((beyond(flat, grille) - 0.3) / 5)
 
     def detail(flat: Floats) -> Floats:
-        sunk = -0.9 * smooth(-beyond(flat, display) / 2.0)
+        sunk = -0.5 * smooth(-beyond(flat, display) / 2.0)
         return sunk + np.sum([_button(flat, key, 1.8) for key in keys], axis=0)
 
     contours = [

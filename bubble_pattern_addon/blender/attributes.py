@@ -63,9 +63,10 @@ def read_values(collection: Any, prop: str, dtype: type, width: int = 1) -> Arra
 
 # Topology and flags by the names of their attributes. As properties of loops, edges and faces the same values
 # take a hundred times as long to read.
-CORNER_VERTEX, CORNER_EDGE, SHARP_EDGE, SHARP_FACE, MATERIAL = (
+CORNER_VERTEX, CORNER_EDGE, EDGE_VERTICES, SHARP_EDGE, SHARP_FACE, MATERIAL = (
     ".corner_vert",
     ".corner_edge",
+    ".edge_verts",
     "sharp_edge",
     "sharp_face",
     "material_index",

@@ -20,6 +20,7 @@ from ..core.metric import Places
 from .attributes import (
     CORNER_EDGE,
     CORNER_VERTEX,
+    EDGE_VERTICES,
     MATERIAL,
     SHARP_EDGE,
     Array,
@@ -29,6 +30,7 @@ from .attributes import (
     write_layer,
     write_values,
 )
+from .part_edges import Edges, find_edges
 from .provenance import Origin, Original, trace, trace_edges
 from .reading import Base, transformed
 from .vertex_groups import write_groups
@@ -52,11 +54,11 @@ def build_part_mesh(
     origin = trace(part, places, base, original)
     mesh = bpy.data.meshes.new(name)
     try:
-        lay_geometry(mesh, original, origin)
-        carry_layers(mesh, original, origin)
+        edges = lay_geometry(mesh, original, origin)
+        carry_layers(mesh, original, origin, edges)
         carry_groups(mesh, original, origin)
         lay_materials(mesh, original, origin, wall_material)
-        lay_sharp_edges(mesh, origin)
+        lay_sharp_edges(mesh, origin, edges)
         if original.corner_normal is not None:
             lay_normals(mesh, original.corner_normal, origin)
         activate(mesh, original)
@@ -66,30 +68,36 @@ def build_part_mesh(
     return mesh
 
 
-def lay_geometry(mesh: bpy.types.Mesh, original: Original, origin: Origin) -> None:
-    """Vertices and faces, in the order of `origin`."""
+def lay_geometry(mesh: bpy.types.Mesh, original: Original, origin: Origin) -> Edges:
+    """Vertices, edges and faces, in the order of `origin`; returns the edges."""
     positions = transformed(origin.positions, origin.base.to_local).astype(np.float32)
     known = np.flatnonzero(origin.vertex >= 0)
     positions[known] = original.position[origin.vertex[known]]
     triangles = np.concatenate([origin.surface, origin.walls])
     corner_vertex = np.concatenate([origin.kept_vertices, triangles.ravel()])
     sizes = np.concatenate([original.loop_total[origin.kept], np.full(len(triangles), 3)])
+    starts = np.cumsum(sizes) - sizes
+    edges = find_edges(corner_vertex, starts, sizes)
     mesh.vertices.add(len(positions))
+    mesh.edges.add(len(edges.ends))
     mesh.loops.add(len(corner_vertex))
     mesh.polygons.add(len(sizes))
     write_values(mesh, "position", 'POINT', 'FLOAT_VECTOR', positions)
     write_values(mesh, CORNER_VERTEX, 'CORNER', 'INT', corner_vertex)
-    mesh.polygons.foreach_set("loop_start", (np.cumsum(sizes) - sizes).astype(np.int32))
-    mesh.update(calc_edges=True)
+    write_values(mesh, EDGE_VERTICES, 'EDGE', 'INT32_2D', edges.ends)
+    write_values(mesh, CORNER_EDGE, 'CORNER', 'INT', edges.of_corner)
+    mesh.polygons.foreach_set("loop_start", starts.astype(np.int32))
+    mesh.update()
+    return edges
 
 
-def carry_layers(mesh: bpy.types.Mesh, original: Original, origin: Origin) -> None:
+def carry_layers(mesh: bpy.types.Mesh, original: Original, origin: Origin, edges: Edges) -> None:
     """Give the part the attributes of its base."""
     edge_source = None
     for layer in original.layers:
         if layer.domain == 'EDGE':
             if edge_source is None:
-                edge_source = trace_edges(mesh, original, origin)
+                edge_source = trace_edges(original, origin, edges)
             values = layer.values[edge_source]
             values[edge_source < 0] = 0
         elif layer.domain == 'FACE':
@@ -188,32 +196,24 @@ def lay_materials(
     write_values(mesh, MATERIAL, 'FACE', 'INT', index)
 
 
-def lay_sharp_edges(mesh: bpy.types.Mesh, origin: Origin) -> None:
+def lay_sharp_edges(mesh: bpy.types.Mesh, origin: Origin, edges: Edges) -> None:
     """Let rims and the creases of walls be sharp, beside what is sharp in the base."""
-    corner_edge = read_named(mesh, CORNER_EDGE, len(mesh.loops))
-    first_wall = len(corner_edge) - origin.walls.size
-    on_wall = np.zeros(len(mesh.edges), dtype=bool)
-    on_wall[corner_edge[first_wall:]] = True
-    on_surface = np.zeros(len(mesh.edges), dtype=bool)
-    on_surface[corner_edge[:first_wall]] = True
-    sharp = read_named(mesh, SHARP_EDGE, len(mesh.edges)).astype(np.bool_)
-    sharp |= on_wall & (on_surface | creased(mesh, corner_edge[first_wall:]))
+    first_wall = len(edges.of_corner) - origin.walls.size
+    sharp = read_named(mesh, SHARP_EDGE, len(edges.ends)).astype(np.bool_)
+    sharp |= (edges.first < first_wall) & (edges.last >= first_wall)
+    within = np.flatnonzero((edges.first >= first_wall) & (edges.first != edges.last))
+    one, other = ((side[within] - first_wall) // 3 for side in (edges.first, edges.last))
+    sharp[within] |= creased(mesh, len(origin.walls), one, other)
     write_values(mesh, SHARP_EDGE, 'EDGE', 'BOOLEAN', sharp)
 
 
-def creased(mesh: bpy.types.Mesh, wall_edges: Ints) -> Bools:
-    """Edges (E,) where two facets of walls meet at more than CREASE, given the edges of all walls' corners.
-
-    The sum of two unit normals is 2 cos(angle / 2) long.
-    """
-    normals = read_values(mesh.polygon_normals, "vector", np.float32, 3)
-    weights = np.repeat(normals[len(normals) - len(wall_edges) // 3 :], 3, axis=0)
-    edges = len(mesh.edges)
-    squared = np.zeros(edges)
-    for axis in range(3):
-        squared += np.bincount(wall_edges, weights=weights[:, axis], minlength=edges) ** 2
-    facets = np.bincount(wall_edges, minlength=edges)
-    return (facets == 2) & (squared < (2 * np.cos(np.radians(CREASE / 2))) ** 2)
+def creased(mesh: bpy.types.Mesh, walls: int, one: Ints, other: Ints) -> Bools:
+    """Which pairs of facets, (m,) and (m,), of the last `walls` faces meet at more than CREASE, (m,)."""
+    normals = read_values(mesh.polygon_normals, "vector", np.float32, 3)[-walls:]
+    cosine = np.zeros(len(one), dtype=np.float32)
+    for along in np.ascontiguousarray(normals.T):
+        cosine += along[one] * along[other]
+    return cosine < np.cos(np.radians(CREASE))
 
 
 def lay_normals(mesh: bpy.types.Mesh, corner_normal: Array, origin: Origin) -> None:

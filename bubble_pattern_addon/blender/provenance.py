@@ -21,6 +21,7 @@ from .attributes import (
     read_named,
     read_values,
 )
+from .part_edges import Edges
 from .reading import Base
 from .vertex_groups import VertexGroup, read_groups
 
@@ -197,8 +198,8 @@ def ranges(start: Ints, total: Ints) -> Ints:
     return np.repeat(start - ends + total, total) + np.arange(ends[-1] if len(ends) else 0)
 
 
-def trace_edges(mesh: bpy.types.Mesh, original: Original, origin: Origin) -> Ints:
-    """The edge of the base that each edge of the part's `mesh` lies on, or -1."""
+def trace_edges(original: Original, origin: Origin, edges: Edges) -> Ints:
+    """The edge of the base that each of the `edges` of the part lies on, or -1, (E,)."""
     loops = np.arange(len(original.loop_vertex))
     following = loops + 1
     following[original.loop_start + original.loop_total - 1] = original.loop_start
@@ -210,9 +211,8 @@ def trace_edges(mesh: bpy.types.Mesh, original: Original, origin: Origin) -> Int
     along = away & np.roll(away, -1, axis=1)  # (S, 3, 3): corner to next corner lies on a side of the base's
     on_side, corner = np.nonzero(along.any(axis=2))
     edge = side[origin.source[on_side], along[on_side, corner].argmax(axis=1)]
-    edge_source = np.full(len(mesh.edges), -1)
-    corner_edge = read_named(mesh, CORNER_EDGE, len(mesh.loops))
+    edge_source = np.full(len(edges.ends), -1)
     kept = len(origin.kept_loops)
-    edge_source[corner_edge[kept + 3 * on_side + corner]] = edge
-    edge_source[corner_edge[:kept]] = original.loop_edge[origin.kept_loops]
+    edge_source[edges.of_corner[kept + 3 * on_side + corner]] = edge
+    edge_source[edges.of_corner[:kept]] = original.loop_edge[origin.kept_loops]
     return edge_source

@@ -118,6 +118,8 @@ def close_pairs(tree: BoxTree, group: Ints | None = None) -> Iterator[tuple[Ints
     group: (T,) pairs within a group from 0 on are left out, those of triangles below 0 are not
     """
     kinds = None if group is None else _groups(tree, group)
+    # a flat thing's layers lie apart along its shortest side
+    axes = np.argsort(tree.half[-1][:, 0], kind="stable")
     root = np.zeros(1, dtype=np.int64)
     waiting = [(len(tree.middle) - 1, root, root)]
     while waiting:
@@ -130,7 +132,8 @@ def close_pairs(tree: BoxTree, group: Ints | None = None) -> Iterator[tuple[Ints
             kind = kinds[level][one]
             apart = np.flatnonzero((kind < 0) | (kind != kinds[level][other]))
             one, other = one[apart], other[apart]
-        for middle, size in zip(tree.middle[level], tree.half[level], strict=True):
+        for axis in axes:
+            middle, size = tree.middle[level][axis], tree.half[level][axis]
             meet = np.flatnonzero(np.abs(middle[one] - middle[other]) <= size[one] + size[other])
             one, other = one[meet], other[meet]
         if level == 0:

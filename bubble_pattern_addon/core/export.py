@@ -11,12 +11,15 @@ from typing import Any
 
 import numpy as np
 
+from .isometries import OFF
+from .mesh import Ints
 from .pattern import Pattern
 from .quality import Quality, measure, min_margin, min_web, open_area
 from .region import Region
 from .solid import Part
 
 COLUMNS = ("id", "x", "y", "z", "nx", "ny", "nz", "diameter", "pitch", "row")
+PARTNER = "partner"
 
 
 def write_features(path: Path, pattern: Pattern) -> None:
@@ -24,26 +27,34 @@ def write_features(path: Path, pattern: Pattern) -> None:
 
     An id is the number of the feature's bubble: it stays when the limits leave out other features.
     x, y, z is the centre on the surface, nx, ny, nz the unit normal there, outward; lengths in the unit of
-    the base. Numbers are written so that they read back as the same double. OSError where the file can't be
-    written.
+    the base. Numbers are written so that they read back as the same double. A symmetric pattern has one
+    column more, PARTNER: the ids of the bubbles that the isometries take this one to, separated by spaces;
+    its own for those that leave it where it is. OSError where the file can't be written.
     """
+    partner = [[]] * len(pattern) if pattern.partners is None else _partner_column(pattern.partners)
     numbers = np.column_stack([pattern.position, pattern.normal, pattern.diameter, pattern.pitch])
     with path.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file)
-        table.writerow(COLUMNS)
+        table.writerow(COLUMNS if pattern.partners is None else (*COLUMNS, PARTNER))
         table.writerows(
-            [number, *values, row]
-            for number, values, row in zip(
-                pattern.ids.tolist(), numbers.tolist(), pattern.row.tolist(), strict=True
+            [number, *values, row, *others]
+            for number, values, row, others in zip(
+                pattern.ids.tolist(), numbers.tolist(), pattern.row.tolist(), partner, strict=True
             )
         )
+
+
+def _partner_column(partners: Ints) -> list[list[str]]:
+    """For every feature the one entry of the column PARTNER."""
+    return [[" ".join(map(str, ids[1:]))] for ids in partners.tolist()]
 
 
 def make_report(region: Region, pattern: Pattern, part: Part, seconds: Mapping[str, float]) -> dict[str, Any]:
     """The figures of a run in the unit of the base, ready for JSON; one with nothing to measure is None.
 
     features, watertight, genus, volume, open_area, min_web, min_margin, quality{six, psi6, gap_cv, gap_min,
-    rim_cv} and seconds{region, pack, shape, add}; further wall{min, max}, the near wall's thickness at the
+    rim_cv} and seconds{region, pack, shape, add}; further symmetry, the recipe's word for the one that the
+    pattern has, or "off", wall{min, max}, the near wall's thickness at the
     features, limits (see limits_report), problems, one sentence each, empty when the part is good, and notes,
     likewise, on what does no harm.
     """
@@ -62,6 +73,7 @@ def make_report(region: Region, pattern: Pattern, part: Part, seconds: Mapping[s
         "min_web": min_web(pattern),
         "min_margin": min_margin(pattern, region),
         "limits": limits_report(pattern),
+        "symmetry": pattern.symmetry or OFF,
         "wall": {
             "min": float(thickness.min()) if len(thickness) else math.nan,
             "max": float(thickness.max()) if len(thickness) else math.nan,

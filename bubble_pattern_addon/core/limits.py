@@ -30,6 +30,8 @@ from .region import Region
 LEAST_WEB = 0.02
 # Normals that agree this well are of one face or of faces one above the other, not on both sides of an edge.
 LEVEL = 0.7
+# Partners of a symmetric pattern whose wished diameters differ by no larger share ask for the same.
+SAME_WISH = 1e-6
 # Webs come out wider than asked by this, so that rounding takes nothing off them.
 ROUNDING = 1e-12
 
@@ -41,7 +43,22 @@ def limited(bubbles: Pattern, region: Region, limits: Limits) -> Pattern:
     """
     wished = bubbles.diameter
     diameter, kept = within_limits(bubbles, region, limits)
+    if bubbles.partners is not None:
+        order = np.argsort(bubbles.ids)
+        partners = order[np.searchsorted(bubbles.ids, bubbles.partners, sorter=order)]
+        diameter, kept = _alike(partners, wished, diameter, kept)
     return split(replace(bubbles, diameter=np.where(kept, diameter, 0.0), wished=wished), kept)
+
+
+def _alike(partners: Ints, wished: Floats, diameter: Floats, kept: Bools) -> tuple[Floats, Bools]:
+    """Diameters and who is kept, (n,), the same for partners (n, k) that ask for the same.
+
+    What is limited has no reason to be left out on one side only; smaller features keep every limit.
+    """
+    asked = wished[partners]
+    alike = np.ptp(asked, axis=1) <= SAME_WISH * asked.max(axis=1)
+    both = np.where(alike, kept[partners].all(axis=1), kept)
+    return np.where(alike, diameter[partners].min(axis=1), diameter), both
 
 
 def within_limits(bubbles: Pattern, region: Region, limits: Limits) -> tuple[Floats, Bools]:

@@ -30,7 +30,11 @@ class Pattern:
     wished: (n,) the size that the shaping metric asked for; None where nothing is known of it
     bubble: (n,) number of the feature's bubble, rising; None where every bubble has a feature
     dropped: the bubbles whose feature was left out as too small; None where none was
-    notes: what a designer should know of the sizes, one sentence each
+    notes: what a designer should know of the pattern, one sentence each
+    packing_notes: those of them that are about the packing, which stay when features are shaped anew
+    symmetry: the recipe's word for the symmetry that the bubbles have, None without one
+    partners: (n, k) for each of its isometries, the first of which leaves everything where it is, the id of
+    the bubble to which it takes this one: of its own where it is on the plane or axis
     """
 
     places: Places
@@ -43,6 +47,9 @@ class Pattern:
     bubble: Ints | None = None
     dropped: Pattern | None = None
     notes: tuple[str, ...] = ()
+    packing_notes: tuple[str, ...] = ()
+    symmetry: str | None = None
+    partners: Ints | None = None
 
     def __len__(self) -> int:
         return len(self.pitch)
@@ -91,10 +98,9 @@ def joined(patterns: Sequence[Pattern]) -> Pattern:
     first = 0
     for pattern in patterns:
         parts = [part for part in (pattern, pattern.dropped) if part is not None]
-        numbered.append(replace(pattern, bubble=pattern.ids + first))
+        numbered.append(_renumbered(pattern, first))
         if pattern.dropped is not None:
-            dropped = replace(pattern.dropped, bubble=pattern.dropped.ids + first)
-            numbered[-1] = replace(numbered[-1], dropped=dropped)
+            numbered[-1] = replace(numbered[-1], dropped=_renumbered(pattern.dropped, first))
         first += 1 + max(int(part.ids.max(initial=-1)) for part in parts)
     left_out = [pattern.dropped for pattern in numbered if pattern.dropped is not None]
     return replace(
@@ -102,6 +108,12 @@ def joined(patterns: Sequence[Pattern]) -> Pattern:
         dropped=_end_to_end(left_out) if left_out else None,
         notes=tuple(dict.fromkeys(note for pattern in patterns for note in pattern.notes)),
     )
+
+
+def _renumbered(pattern: Pattern, first: int) -> Pattern:
+    """The pattern with all ids raised by `first`."""
+    partners = None if pattern.partners is None else pattern.partners + first
+    return replace(pattern, bubble=pattern.ids + first, partners=partners)
 
 
 def _end_to_end(parts: Sequence[Pattern]) -> Pattern:
@@ -112,6 +124,9 @@ def _end_to_end(parts: Sequence[Pattern]) -> Pattern:
 
     places = [part.places for part in parts]
     names = ("position", "triangle", "barycentric")
+    # Parts with different symmetries, or one without, have none together.
+    words = {None if part.partners is None else part.symmetry for part in parts}
+    symmetric = len(words) == 1 and None not in words
     known = any(part.wished is not None for part in parts)
     wished = [part.diameter if part.wished is None else part.wished for part in parts]
     return Pattern(
@@ -119,6 +134,9 @@ def _end_to_end(parts: Sequence[Pattern]) -> Pattern:
         **{name: column(name) for name in COLUMNS},
         wished=np.concatenate(wished) if known else None,
         bubble=column("ids"),
+        packing_notes=tuple(dict.fromkeys(note for part in parts for note in part.packing_notes)),
+        symmetry=parts[0].symmetry if symmetric else None,
+        partners=column("partners") if symmetric else None,
     )
 
 
@@ -131,5 +149,6 @@ def take(pattern: Pattern, which: Bools | Ints) -> Pattern:
         **{name: getattr(pattern, name)[which] for name in COLUMNS},
         wished=None if pattern.wished is None else pattern.wished[which],
         bubble=pattern.ids[which],
+        partners=None if pattern.partners is None else pattern.partners[which],
         dropped=None,
     )

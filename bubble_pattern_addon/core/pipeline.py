@@ -39,6 +39,9 @@ def pattern_steps(region: Region, recipe: Recipe, surroundings: Surroundings = N
     yield Progress("Shaping the features", 0.95)
     spots = bubbles.spots
     pitch = local_pitch(ground, bubbles)
+    if bubbles.partners is not None:
+        # Partners are alike also where the metric is so only within the tolerance.
+        pitch = pitch[bubbles.partners].min(axis=1)
     points = positions(ground.charts, spots)
     places = Places(points, region.triangles[spots.row], spots.barycentric)
     links = find_links(ground.charts, points, spots.row, pitch)
@@ -50,6 +53,9 @@ def pattern_steps(region: Region, recipe: Recipe, surroundings: Surroundings = N
         pitch=pitch,
         diameter=np.zeros(len(pitch)),
         row=_rows(links, len(pitch), bubbles.fixed),
+        packing_notes=ground.notes,
+        symmetry=None if ground.symmetry is None else ground.symmetry.group.word,
+        partners=bubbles.partners,
     )
     return shaped(packed, links, region, recipe, surroundings)
 

@@ -18,6 +18,7 @@ from typing import Any
 from .blending import Fill
 from .errors import RecipeError
 from .field_tables import asks_for_pitch, field_from_toml, field_to_toml
+from .isometries import OFF, check_symmetry
 from .metric import Constant, Described
 from .toml_values import (
     Point,
@@ -70,6 +71,9 @@ class Packing:
 
     orientation: where the rows of the arrangement run, "edge" (along the longest straight stretch of the
     boundary), a vector, or "best" (several directions are tried)
+    symmetry: "off"; "auto", whichever the region has; "x", "xy" and so on, mirrored at planes square to these
+    axes of the base; "rotate 3" or "rotate 3 z", turned into itself by thirds about an axis (see
+    core.isometries); symmetry_centre: a point of the planes or the axis, None for the region's own middle
     """
 
     pitch: Described = Constant(3.0)
@@ -79,6 +83,8 @@ class Packing:
     seed: int = 0
     iterations: int = 60
     tolerance: float = 1e-3
+    symmetry: str = OFF
+    symmetry_centre: Point | None = None
 
 
 @dataclass(frozen=True)
@@ -321,6 +327,8 @@ READERS: dict[str, dict[str, Callable[[object, str], Any]]] = {
         "seed": whole,
         "iterations": whole,
         "tolerance": number,
+        "symmetry": text,
+        "symmetry_centre": point,
     },
     "shaping": {
         "diameter": field_from_toml,
@@ -374,6 +382,9 @@ def check_recipe(recipe: Recipe) -> None:
     check_at_least(packing.seed, 0, "[packing] seed")
     check_at_least(packing.iterations, 1, "[packing] iterations")
     check_above(packing.tolerance, "[packing] tolerance")
+    check_symmetry(packing.symmetry, "[packing] symmetry")
+    for coordinate in packing.symmetry_centre or ():
+        check_finite(coordinate, "[packing] symmetry_centre")
     check_one_of(feature.kind, KINDS, "[feature] kind")
     if feature.depth is not None:
         check_above(feature.depth, "[feature] depth")

@@ -38,7 +38,9 @@ def shaped(
     FieldError where the surroundings lack something.
     """
     wished, notes = diameters(recipe.shaping, bubbles, links, replace(surroundings, region=region))
-    pattern = limited(replace(bubbles, diameter=wished, notes=notes), region, recipe.limits)
+    pattern = limited(
+        replace(bubbles, diameter=wished, notes=(*bubbles.packing_notes, *notes)), region, recipe.limits
+    )
     if len(bubbles) and not len(pattern):
         raise RecipeError(
             "No feature is left: diameters up to {widest} do not go with [limits] min_web = {web}, "

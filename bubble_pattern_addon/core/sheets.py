@@ -49,8 +49,8 @@ def sheets(mesh: Mesh, neighbour: Ints) -> Ints:
     way = _ways(area_columns(turned.columns))
     links = way == way[neighbour]
     sheet = linked(neighbour, links)
-    rim, bad = _rims(turned, way, sheet, ~links)
-    bad |= _winding(rim, len(bad)) | _crossing(rim, len(bad))
+    rim, count = _rims(turned, way, sheet, ~links), int(sheet.max()) + 1
+    bad = _winding(rim, count) | _crossing(rim, count)
     return np.where(bad[sheet], -1, sheet)
 
 
@@ -64,13 +64,10 @@ def _ways(area: Floats) -> Ints:
     return axis + 3 * (area[axis, np.arange(len(axis))] < 0)
 
 
-def _rims(mesh: Mesh, way: Ints, sheet: Ints, border: Bools) -> tuple[_Rims, Bools]:
-    """The rims of the sheets, and which sheets have a rim that touches itself in a vertex.
-
-    border: (3, T) whether the sheet ends at that edge
-    """
+def _rims(mesh: Mesh, way: Ints, sheet: Ints, border: Bools) -> _Rims:
+    """The rims of the sheets; border: (3, T) whether the sheet ends at that edge."""
     corner, triangle = np.nonzero(border)
-    owner, count = sheet[triangle], int(sheet.max()) + 1
+    owner = sheet[triangle]
     ends = mesh.triangles[triangle, corner], mesh.triangles[triangle, (corner + 1) % 3]
     axis, back = way[triangle] % 3, way[triangle] >= 3
     # seen from outside: to the right and up, so that faces run counter-clockwise
@@ -78,10 +75,8 @@ def _rims(mesh: Mesh, way: Ints, sheet: Ints, border: Bools) -> tuple[_Rims, Boo
     start, end = (np.stack([mesh.vertices[side, right], mesh.vertices[side, up]]) for side in ends)
     here, there = (owner * len(mesh.vertices) + side for side in ends)
     order = np.argsort(here)
-    ranked = here[order]
-    bad = np.zeros(count, dtype=bool)
-    bad[owner[order[1:]][ranked[1:] == ranked[:-1]]] = True
-    return _Rims(owner, start, end, order[np.searchsorted(ranked, there)]), bad
+    # where a rim touches itself in a vertex it has several edges to go on with: any will do, as it is bad
+    return _Rims(owner, start, end, order[np.searchsorted(here[order], there)])
 
 
 def _winding(rim: _Rims, count: int) -> Bools:
@@ -110,10 +105,9 @@ def _crossing(rim: _Rims, count: int) -> Bools:
         a, b, c, d = rim.start[:, one], rim.end[:, one], rim.start[:, other], rim.end[:, other]
         sides = [_side(a, b, c) * _side(a, b, d), _side(c, d, a) * _side(c, d, b)]
         meet = (sides[0] <= 0) & (sides[1] <= 0)
-        # an edge and the next one always meet; they must not turn back on each other
-        after, before = rim.following[one] == other, rim.following[other] == one
-        back = (_side(a, b, np.where(after, d, c)) == 0) & (((b - a) * (d - c)).sum(axis=0) < 0)
-        bad[rim.sheet[one[np.where(after | before, back, meet)]]] = True
+        # an edge and the next one always meet; where they turn back on each other, others meet them there
+        meet &= (rim.following[one] != other) & (rim.following[other] != one)
+        bad[rim.sheet[one[meet]]] = True
     return bad
 
 

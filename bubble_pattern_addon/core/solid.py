@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import manifold3d
@@ -205,15 +206,20 @@ def _manifold(mesh: Mesh, facet: Ints, name: int) -> manifold3d.Manifold:
 
 def _judge(feature: Feature, plan: Plan, left: Cut) -> Part:
     """The Part from what the boolean left: where its faces come from, and what can be measured on it."""
-    sound = plan.sound
-    known, named = carry.same_places(sound.mesh.vertices, left.mesh.vertices)
-    whole, turn = carry.whole_faces(left.surface, named, left.face, known[sound.mesh.triangles])
-    mesh = Mesh(left.mesh.vertices, carry.turned(left.mesh.triangles, turn))
-    owner = plan.cutters.feature[left.facet]
-    source = np.concatenate([sound.triangle[left.face], -1 - owner])
-    vertex = np.where(named >= 0, sound.vertex[named], -1)
+    # numpy's work on large arrays goes on beside the rest
+    with ThreadPoolExecutor(1) as beside:
+        measured = beside.submit(measure, left.mesh)
+        sound = plan.sound
+        known, named = carry.same_places(sound.mesh.vertices, left.mesh.vertices)
+        whole, turn = carry.whole_faces(left.surface, named, left.face, known[sound.mesh.triangles])
+        mesh = Mesh(left.mesh.vertices, carry.turned(left.mesh.triangles, turn))
+        owner = plan.cutters.feature[left.facet]
+        source = np.concatenate([sound.triangle[left.face], -1 - owner])
+        vertex = np.where(named >= 0, sound.vertex[named], -1)
+        untouched = np.concatenate([whole, np.zeros(len(owner), dtype=bool)])
+        shape = _wall_shapes(left, owner, len(plan.pattern))
+        unchanged, notes = _unchanged(plan, left, named, whole)
 
-    shape = _wall_shapes(left, owner, len(plan.pattern))
     cut = plan.fault == Fault.NONE
     pierced = cut & (shape == 0)
     failures = _failures(plan)
@@ -224,9 +230,7 @@ def _judge(feature: Feature, plan: Plan, left: Cut) -> Part:
     if len(torn):
         state = "do not pierce one wall cleanly" if feature.depth is None else "have no clean floor and wall"
         problems.append(f"{len(torn):,} holes {state}, the first is {_place(plan.pattern, int(torn[0]))}.")
-    unchanged, notes = _unchanged(plan, left, named, whole)
-    check = check_part(measure(mesh), sound.measures, int(pierced.sum()), unchanged, problems, notes)
-    untouched = np.concatenate([whole, np.zeros(len(owner), dtype=bool)])
+    check = check_part(measured.result(), sound.measures, int(pierced.sum()), unchanged, problems, notes)
     return Part(mesh, source, vertex, untouched, plan.wall.thickness, pierced, failures, check)
 
 

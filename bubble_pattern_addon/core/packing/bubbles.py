@@ -7,15 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..boundary import Boundary
-from ..mesh import Bools
+from ..mesh import Bools, Ints
 from ..surface import Charts, Spots
+from ..symmetry import Symmetry
 from .rim import Lengths, Track
 
 
 @dataclass(frozen=True)
 class Ground:
     """What bubbles are packed on: the surface, its boundary (None where there is none), the first row's
-    track, the packing metric at places, its value where it is the same everywhere, and the edge offset.
+    track, the packing metric at places, its value where it is the same everywhere, and the edge offset; the
+    symmetry that the pattern shall have, or None, and what a designer should know of that.
     """
 
     charts: Charts
@@ -24,16 +26,24 @@ class Ground:
     pitch: Lengths
     uniform: float | None
     edge_offset: float
+    symmetry: Symmetry | None = None
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Bubbles:
     """Places of n bubbles, of which the first `fixed` stay where they are: the first row along the boundary,
     whose even spacing is what the eye sees first, and single rows in the middle of narrow places.
+
+    In a symmetric pattern that is whole, partners (n, k) is the number of each bubble's image under each of
+    the k isometries, the first of which leaves everything where it is, and orbit (n,) numbers those that are
+    images of one another.
     """
 
     spots: Spots
     fixed: int = 0
+    partners: Ints | None = None
+    orbit: Ints | None = None
 
     def __len__(self) -> int:
         return len(self.spots.row)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..boundary import make_boundary, nearest_boundary, signature
@@ -13,12 +15,14 @@ from ..quality import measure_points
 from ..recipe import Packing
 from ..region import Region
 from ..surface import Charts, Complex, Spots, make_charts, positions, to_frame, walk
+from ..symmetry import find_symmetry
 from .bubbles import Bubbles, Ground, can_move, joined
 from .crowding import close_pairs, uncrowded
 from .direction import smooth_directions
 from .force import STIFFNESS, stiff_law
 from .lattice import grow
 from .narrows import in_the_narrows
+from .orbits import orbit_sizes, settled_leaders, symmetric_start, with_followers
 from .plane import fills_its_box, lay
 from .population import control, pressed_out
 from .relax import relax
@@ -33,6 +37,7 @@ from .rim import (
     straight_stretches,
 )
 from .rk4 import integrate
+from .symmetric_start import loop_starts, suiting, symmetric_seeds
 
 # A recipe that asks for more bubbles than this is taken for a slip of the pen.
 MOST = 1_000_000
@@ -60,7 +65,10 @@ def pack_steps(region: Region, packing: Packing) -> Steps[tuple[Ground, Bubbles]
     _check_count(region, pitch)
     uniform = packing.pitch.value if isinstance(packing.pitch, Constant) else None
     ground = _ground(charts, pitch, uniform, packing.edge_offset)
-    along, between = in_the_narrows(ground, _without_conflicts(ground, first_row(ground.track)))
+    finding = find_symmetry(charts, ground.boundary, pitch, packing.symmetry, packing.symmetry_centre)
+    ground = replace(ground, symmetry=finding.symmetry, notes=finding.notes)
+    row = first_row(ground.track, loop_starts(ground))
+    along, between = in_the_narrows(ground, _without_conflicts(ground, row))
     first = spots_on_track(charts, ground.track, along.arc) if len(along.arc) else _nobody()
     fixed = joined(first, between)
     if packing.orientation == "best":
@@ -101,6 +109,8 @@ def _settled(
     """Bubbles in balance: those that are `fixed`, and a lattice from `seeds` with rows along `directions`."""
     yield Progress("Growing the lattice", 0.1)
     bubbles = Bubbles(joined(fixed, _lattice(ground, seeds, directions)), len(fixed.row))
+    if ground.symmetry is not None:
+        bubbles = symmetric_start(ground, bubbles)
     if not len(bubbles):
         raise RegionError(
             "No bubble fits into the target region: it is narrower than one pitch everywhere; use a smaller "
@@ -110,23 +120,28 @@ def _settled(
         yield Progress("Packing the bubbles", 0.2 + 0.2 * number)
         local = local_pitch(ground, bubbles)
         settle = relax if packing.integrator == "fire" else integrate
-        bubbles, _ = settle(ground, bubbles, _filling(ground, local), packing.iterations, packing.tolerance)
+        bubbles, _ = settle(
+            ground, bubbles, _filling(ground, bubbles, local), packing.iterations, packing.tolerance
+        )
         bubbles, changed = control(ground, bubbles, local)
         if not changed:
             break
     yield Progress("Evening out the gaps", 0.8)
     while True:
         local = local_pitch(ground, bubbles)
-        size, stiffness = _filling(ground, local), 1.0 + STIFFNESS
+        size, stiffness = _filling(ground, bubbles, local), 1.0 + STIFFNESS
         bubbles, _ = relax(ground, bubbles, size, STIFF_STEPS, packing.tolerance, stiff_law, stiffness)
         kept = ~pressed_out(ground, bubbles, local_pitch(ground, bubbles))
         if kept.all():
-            return bubbles
+            break
         # What stiff contacts have squeezed through the first row has no place between it and the boundary.
         bubbles = Bubbles(bubbles.spots.take(kept), bubbles.fixed)
+    if ground.symmetry is not None:
+        bubbles = with_followers(ground, settled_leaders(ground, bubbles))
+    return bubbles
 
 
-def _filling(ground: Ground, local: Floats) -> Floats:
+def _filling(ground: Ground, bubbles: Bubbles, local: Floats) -> Floats:
     """The pitches (n,) at which n bubbles of the `local` ones fill a surface without a boundary.
 
     Nothing holds them together there: whoever is missing for a full arrangement would leave the others loose
@@ -134,7 +149,8 @@ def _filling(ground: Ground, local: Floats) -> Floats:
     """
     if ground.boundary is not None:
         return local
-    room = ground.charts.region.area / (np.sqrt(0.75) * (local**2).sum())
+    share = orbit_sizes(ground, bubbles, local)
+    room = ground.charts.region.area / (np.sqrt(0.75) * (share * local**2).sum())
     return local * max(CRAMPED * np.sqrt(room), 1.0)
 
 
@@ -205,10 +221,11 @@ def _without_conflicts(ground: Ground, row: FirstRow) -> FirstRow:
 def _lattice(ground: Ground, seeds: Spots, directions: Complex) -> Spots:
     """Bubbles of a lattice that fills what the first row leaves free."""
     charts = ground.charts
+    seeds, directions, origin = symmetric_seeds(ground, seeds, directions)
     uniform = ground.uniform if charts.region.flat else None
     if uniform is not None and ground.boundary is not None and fills_its_box(charts, uniform):
         clear = CLEAR_OF_RIM * uniform + ground.edge_offset
-        return lay(charts, ground.boundary, uniform, clear, seeds, directions)
+        return lay(charts, ground.boundary, uniform, clear, seeds, directions, origin)
     closed = np.bincount(charts.region.sheet[charts.region.rim[:, 0]], minlength=len(seeds.row)) == 0
     field = smooth_directions(charts, closed[charts.region.sheet]) if closed.any() else None
     if field is not None:
@@ -238,7 +255,8 @@ def _seeds(ground: Ground, seed: int, rows: tuple[float, float, float] | None) -
     directions = np.ones(len(seeds.row), dtype=np.complex128)
     if len(track.arc):
         middle, length, sheet = straight_stretches(charts, track)
-        order = np.lexsort((middle, -length, sheet))
+        suits = suiting(ground, on_track(track, middle)[0], ground.pitch(track.spots))
+        order = np.lexsort((middle, -length, ~suits, length <= LONG_ENOUGH, sheet))
         best = order[np.concatenate([[True], np.diff(sheet[order]) != 0])]
         best = best[length[best] > LONG_ENOUGH]
         _, tangent, _ = on_track(track, middle[best])

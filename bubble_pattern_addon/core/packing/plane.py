@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from ..boundary import Boundary, inside_distance
 from ..mesh import Bools, Floats
-from ..surface import Charts, Complex, Spots, in_plane, nearest_signpost, positions, search, to_space
+from ..surface import Charts, Complex, Spots, in_plane, nearest_signpost, search, to_space
 
 # A region that fills less than this share of the box round it is not worth laying a lattice over that box.
 LEAST_FILLED = 0.1
@@ -28,15 +28,21 @@ def fills_its_box(charts: Charts, pitch: float) -> bool:
 
 
 def lay(
-    charts: Charts, boundary: Boundary, pitch: float, clear: float, seeds: Spots, directions: Complex
+    charts: Charts,
+    boundary: Boundary,
+    pitch: float,
+    clear: float,
+    seeds: Spots,
+    directions: Complex,
+    origin: Floats,
 ) -> Spots:
-    """Places of the lattices of one `pitch` through `seeds`, one for each part of a flat region, with a row
-    along each seed's direction, as far as they are farther inside the boundary than `clear`.
+    """Places of the lattices of one `pitch` through the points `origin` (s, 3), one for each part of a flat
+    region, with a row along the direction that each of `seeds` has, as far as they are farther inside the
+    boundary than `clear`.
     """
     region = charts.region
     found: list[Spots] = []
     across, axes = _corners_in_plane(charts)
-    origin = positions(charts, seeds)
     along = to_space(charts, seeds.row, directions)
     for sheet in range(len(seeds.row)):
         rows = np.flatnonzero(region.sheet == sheet)

@@ -12,6 +12,7 @@ from ..surface import Charts, Spots, positions, to_frame, walk
 from .bubbles import Bubbles, Ground, joined
 from .crowding import close_pairs, uncrowded
 from .force import Pairs, find_pairs
+from .orbits import HALO, followers_of, leaders_of, on_their_planes, ranked, settled_leaders
 
 # A circle through three bubbles with no other inside is a void when its radius is above this share of the
 # pitch (it is 0.577 in the hexagonal arrangement, 0.707 in the square one).
@@ -38,18 +39,45 @@ def overlap_ratio(pairs: Pairs, distance: Floats, pitch: Floats) -> Floats:
 
 
 def control(ground: Ground, bubbles: Bubbles, pitch: Floats) -> tuple[Bubbles, int]:
-    """Bubbles without the too crowded ones and with new ones in the voids; and how many came or went."""
-    points, row, m = positions(ground.charts, bubbles.spots), bubbles.spots.row, bubbles.fixed
-    pairs = find_pairs(ground.charts, points, row, pitch, 0.0)
+    """Bubbles without the too crowded ones and with new ones in the voids; and how many came or went.
+
+    In a symmetric pattern these are the leaders, and whoever comes or goes does so with its followers.
+    """
+    spots, n, m = bubbles.spots, len(bubbles), bubbles.fixed
+    owner = np.arange(n)
+    if ground.symmetry is not None:
+        followers = followers_of(ground, spots, pitch, HALO)
+        spots, owner = joined(spots, followers.spots), np.concatenate([owner, followers.leader])
+    points, row, everywhere = positions(ground.charts, spots), spots.row, pitch[owner]
+    pairs = find_pairs(ground.charts, points, row, everywhere, 0.0)
     distance = np.linalg.norm(points[pairs.first] - points[pairs.second], axis=1)
-    ratio = overlap_ratio(pairs, distance, pitch)
+    ratio = overlap_ratio(pairs, distance, everywhere)
     gone = pressed_out(ground, bubbles, pitch)
     most = CROWDED if ground.uniform is not None else CROWDED_GRADED
-    gone[m:] |= _too_crowded(pairs, distance, ratio, m, most)
-    added = _voids(ground, points, row, pitch, np.flatnonzero(ratio < LONELY))
+    gone[m:] |= _too_crowded(pairs, distance / pairs.stable, ratio[:n], owner, m, most)
+    added = _voids(ground, points, row, everywhere, np.flatnonzero(ratio < LONELY))
     if not gone.any() and not len(added.row):
         return bubbles, 0
-    return Bubbles(joined(bubbles.spots.take(~gone), added), m), int(gone.sum()) + len(added.row)
+    if ground.symmetry is None:
+        return Bubbles(joined(bubbles.spots.take(~gone), added), m), int(gone.sum()) + len(added.row)
+    added = _leading(ground, added, points, row)
+    grown = Bubbles(joined(bubbles.spots.take(~gone), added), m)
+    return settled_leaders(ground, grown), int(gone.sum()) + len(added.row)
+
+
+def _leading(ground: Ground, added: Spots, points: Floats, row: Ints) -> Spots:
+    """Of places for new bubbles in a symmetric pattern those of leaders, moved onto the planes they are
+    close to.
+    """
+    if not len(added.row):
+        return added
+    before = positions(ground.charts, added)
+    added, off = on_their_planes(ground, added, ground.pitch(added))
+    at, pitch = positions(ground.charts, added), ground.pitch(added)
+    moved = np.linalg.norm(at - before, axis=1) > 1e-9 * pitch
+    free = _empty(ground, added, at, points, row, np.where(moved, 0.75, 0.0) * pitch) & (off < 1e-3)
+    added = added.take(free)
+    return added.take(leaders_of(ground, added, ranked(ground, added, 0)))
 
 
 def pressed_out(ground: Ground, bubbles: Bubbles, pitch: Floats) -> Bools:
@@ -62,17 +90,21 @@ def pressed_out(ground: Ground, bubbles: Bubbles, pitch: Floats) -> Bools:
     return out
 
 
-def _too_crowded(pairs: Pairs, distance: Floats, ratio: Floats, m: int, most: float) -> Bools:
-    """Which of the n - m free bubbles have an overlap ratio above `most` while no neighbour has more."""
+def _too_crowded(pairs: Pairs, relative: Floats, ratio: Floats, owner: Ints, m: int, most: float) -> Bools:
+    """Which of the n - m free bubbles have an overlap ratio above `most` while no neighbour has more.
+
+    relative: (p,) the pairs' distances in stable distances; ratio: (n,) overlap of the bubbles; owner: which
+    of these each one in the pairs is, or is an image of
+    """
+    first, second = owner[pairs.first], owner[pairs.second]
     closest = np.full(len(ratio), np.inf)
-    relative = distance / pairs.stable
-    np.minimum.at(closest, pairs.first, relative)
-    np.minimum.at(closest, pairs.second, relative)
+    np.minimum.at(closest, first, relative)
+    np.minimum.at(closest, second, relative)
     crowded = (ratio > most) | (closest < 0.6)
     crowded[:m] = False
-    rivals = crowded[pairs.first] & crowded[pairs.second]
+    rivals = crowded[first] & crowded[second] & (first != second)
     order = np.lexsort((np.arange(len(ratio)), -ratio)).argsort()
-    kept = uncrowded(np.stack([pairs.first[rivals], pairs.second[rivals]], axis=1), order)
+    kept = uncrowded(np.stack([first[rivals], second[rivals]], axis=1), order)
     # Of neighbours that are both crowded only the worst goes: its going relieves the other.
     return (crowded & kept)[m:]
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..mesh import Bools, Floats
-from .bubbles import Bubbles, Ground, can_move
+from .bubbles import Bubbles, Ground
 from .force import Law, force_law
 from .swarm import (
     FEW,
@@ -79,7 +79,9 @@ def relax(
     fire = Fire(np.zeros_like(swarm.points), quickest, 0.5 * quickest)
     # A bubble at rest that feels less than this would move by less than the tolerance in its first step.
     quiet = tolerance / fire.pace**2
-    everyone = can_move(bubbles) if moving is None else moving & can_move(bubbles)
+    everyone = swarm.movable
+    if moving is not None:
+        everyone[: len(bubbles)] &= moving
     links = links_of(swarm, np.flatnonzero(everyone))
     looked_at_all, done = True, 0
     while done < iterations:
@@ -121,6 +123,10 @@ def _with_neighbours(swarm: Swarm, stirred: Bools) -> Bools:
         wave = reached.copy()
         wave[swarm.pairs.first[reached[swarm.pairs.second]]] = True
         wave[swarm.pairs.second[reached[swarm.pairs.first]]] = True
+        if swarm.followers is not None:
+            # Whom a leader's image reaches, an image of the leader's own reaches from there.
+            wave[swarm.followers.leader[wave[len(swarm.bubbles) :]]] = True
+            wave[len(swarm.bubbles) :] = wave[swarm.followers.leader]
         reached = wave
     return reached
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -44,6 +45,15 @@ class Track:
     chain: Ints
     sharp: Bools
     closed: Bools
+
+
+class Starts(NamedTuple):
+    """Where bubbles round smooth closed lines begin: arc (C,) of the first, and of what their count is a
+    multiple, (C,).
+    """
+
+    arc: Floats
+    multiple: Ints
 
 
 @dataclass(frozen=True)
@@ -356,9 +366,9 @@ def _groups(peaks: Ints, arc: Floats, around: float) -> list[Ints]:
     return groups
 
 
-def first_row(track: Track) -> FirstRow:
+def first_row(track: Track, starts: Starts | None = None) -> FirstRow:
     """Bubbles of the first row: one at every sharp corner, the others evenly spaced between (in local
-    pitches).
+    pitches). Round lines without a corner they begin as `starts` says, or anywhere.
     """
     parts: list[FirstRow] = []
     for number, closed in enumerate(track.closed):
@@ -367,9 +377,12 @@ def first_row(track: Track) -> FirstRow:
         corners = track.arc[knots[track.sharp[knots]]]
         around = high - low if closed else 0.0
         ends = np.append(corners, corners[0] + around) if closed and len(corners) else corners
-        stretches = list(pairwise(ends)) if len(ends) else [(low, high)]
+        stretches, multiple = list(pairwise(ends)), 1
+        if not len(ends):
+            begin, multiple = (low, 1) if starts is None else (starts.arc[number], starts.multiple[number])
+            stretches = [(begin, begin + high - low)]
         for start, stop in stretches:
-            count = _count(stop - start)
+            count = multiple * _count((stop - start) / multiple)
             arc = start + (stop - start) * np.arange(count) / count
             corner = (np.arange(count) == 0) & bool(len(ends))
             parts.append(FirstRow(np.where(arc > high, arc - around, arc), corner, np.full(count, around)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..mesh import Floats
-from .bubbles import Bubbles, Ground, can_move
+from .bubbles import Bubbles, Ground
 from .force import Law, force_law
 from .relax import LONGEST_STEP
 from .swarm import SKIN, Work, bubbles_of, land, links_of, list_anew, move, pull_on, swarm_of, twin
@@ -25,7 +25,7 @@ def integrate(
     the surface at every stage.
     """
     swarm = swarm_of(ground, bubbles, pitch)
-    everyone = np.flatnonzero(can_move(bubbles))
+    everyone = np.flatnonzero(swarm.movable)
     links = links_of(swarm, everyone)
     velocity = np.zeros((len(everyone), 3))
     for _ in range(iterations):

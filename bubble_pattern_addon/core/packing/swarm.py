@@ -11,10 +11,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.sparse import csc_array
 
-from ..mesh import Floats, Ints
+from ..isometries import image_of
+from ..mesh import Bools, Floats, Ints
 from ..surface import Spots, positions, to_frame, walk
-from .bubbles import Bubbles, Ground
+from .bubbles import Bubbles, Ground, can_move, joined
 from .force import Law, Pairs, find_pairs, renewed_pairs
+from .orbits import HALO, Followers, followers_of, held
 
 # Pairs are listed with this reserve, in pitches (small enough to leave a lattice's next shell out, at 1.73),
 # and a bubble's are listed anew when it has moved by half of that.
@@ -43,7 +45,9 @@ class Swarm:
     points: (n, 3) where they are now; landed: (n, 3) where they last were exactly on the surface, there in
     the triangles row (n,) with barycentric coordinates bary (n, 3) and normal (n, 3); drift: the farthest any
     may have moved since, in pitches, and afloat: how far they may; pairs are valid while no bubble is farther
-    than half the skin from listed_at (n, 3), and none is farther from there than strayed, in pitches
+    than half the skin from listed_at (n, 3), and none is farther from there than strayed, in pitches;
+    followers: in a symmetric pattern, those that stand after the bubbles and go where these take them; still:
+    rows of the bubbles that stay on a plane or an axis, and the projectors (s, 3, 3) onto it
     """
 
     ground: Ground
@@ -59,12 +63,27 @@ class Swarm:
     drift: float = 0.0
     afloat: float = AFLOAT
     strayed: float = 0.0
+    followers: Followers | None = None
+    still: tuple[Ints, Floats] | None = None
     work: Work = field(default_factory=Work)
+
+    @property
+    def movable(self) -> Bools:
+        """Which may move by themselves, (n,)."""
+        return np.concatenate([can_move(self.bubbles), np.zeros(len(self.points) - len(self.bubbles), bool)])
 
 
 def swarm_of(ground: Ground, bubbles: Bubbles, pitch: Floats) -> Swarm:
     """The bubbles as arrays, with their pairs listed."""
     charts, spots = ground.charts, bubbles.spots
+    followers = still = None
+    if ground.symmetry is not None:
+        followers = followers_of(ground, spots, pitch, HALO)
+        projectors = held(ground.symmetry.group, positions(charts, spots), pitch)
+        special = np.flatnonzero(np.abs(projectors - np.eye(3)).max(axis=(1, 2)) > 1e-9)
+        still = special, projectors[special]
+        spots = joined(spots, followers.spots)
+        pitch = np.concatenate([pitch, pitch[followers.leader]])
     points = positions(charts, spots)
     return Swarm(
         ground=ground,
@@ -77,7 +96,21 @@ def swarm_of(ground: Ground, bubbles: Bubbles, pitch: Floats) -> Swarm:
         normal=charts.region.normals[spots.row],
         pairs=find_pairs(charts, points, spots.row, pitch, SKIN),
         listed_at=points.copy(),
+        followers=followers,
+        still=still,
     )
+
+
+def follow(swarm: Swarm) -> None:
+    """Bring the followers to where their leaders' images are, and who stays on a plane back onto it."""
+    symmetry = swarm.ground.symmetry
+    if symmetry is None or swarm.followers is None or swarm.still is None:
+        return
+    (rows, projectors), centre = swarm.still, symmetry.group.centre
+    offset = swarm.points[rows] - centre
+    swarm.points[rows] = centre + np.einsum("nab,nb->na", projectors, offset)
+    leading = swarm.points[swarm.followers.leader]
+    swarm.points[len(swarm.bubbles) :] = image_of(symmetry.group, swarm.followers.number, leading)
 
 
 def twin(swarm: Swarm) -> Swarm:
@@ -88,8 +121,9 @@ def twin(swarm: Swarm) -> Swarm:
 
 def bubbles_of(swarm: Swarm) -> Bubbles:
     """The bubbles where the swarm has them."""
-    _walk_there(swarm, np.flatnonzero((swarm.points != swarm.landed).any(axis=1)))
-    return Bubbles(Spots(swarm.row, swarm.bary), swarm.bubbles.fixed)
+    n = len(swarm.bubbles)
+    _walk_there(swarm, np.flatnonzero((swarm.points[:n] != swarm.landed[:n]).any(axis=1)))
+    return Bubbles(Spots(swarm.row[:n], swarm.bary[:n]), swarm.bubbles.fixed)
 
 
 @dataclass(frozen=True)
@@ -153,6 +187,7 @@ def move(swarm: Swarm, links: Links, steps: Floats, longest: float) -> None:
     swarm.drift += longest
     swarm.strayed += longest
     swarm.points[links.active] += steps * links.pitch
+    follow(swarm)
 
 
 def land(swarm: Swarm, active: Ints) -> None:
@@ -163,6 +198,7 @@ def land(swarm: Swarm, active: Ints) -> None:
         return
     before = swarm.points[active]
     _walk_there(swarm, active)
+    follow(swarm)
     shift = swarm.points[active] - before
     off = np.sqrt((np.einsum("ac,ac->a", shift, shift) / swarm.pitch[active] ** 2).max(initial=0.0))
     if off > OFF:
@@ -193,7 +229,11 @@ def list_anew(swarm: Swarm, active: Ints, beyond: float) -> bool:
     if swarm.strayed < beyond:
         return False
     # Those half-way there are listed along: they would ask for it soon.
-    stale = active[shift > (beyond / 2) ** 2]
+    moved = np.zeros(len(swarm.points), dtype=bool)
+    moved[active[shift > (beyond / 2) ** 2]] = True
+    if swarm.followers is not None:
+        moved[len(swarm.bubbles) :] = moved[swarm.followers.leader]
+    stale = np.flatnonzero(moved)
     charts, points, row, pitch = swarm.ground.charts, swarm.points, swarm.row, swarm.pitch
     if len(stale) > 0.3 * len(points) or len(points) < FEW:
         swarm.pairs = find_pairs(charts, points, row, pitch, SKIN)
