@@ -274,8 +274,8 @@ def adding(repeats: int) -> None:
     print(
         "\n## Adding\n\n32-sided through-holes. Ours: everything, the base looked through for the first "
         "time; again: the same\nbase once more, known to be sound. Bare: the subtraction alone, both solids "
-        "built beforehand; built: with their\nbuilding. Seconds are the least of several runs in turn; ratio: ours "
-        "by bare; cores: the same in seconds of all\ncores together."
+        "built beforehand; built: with their\nbuilding. Seconds are the least of several runs in turn; ratio: "
+        "ours by bare; cores: the same in seconds of all\ncores together."
     )
     print_head(
         "| base | triangles | holes | ours, s | again, s | bare, s | built, s | ratio | cores "
