@@ -20,11 +20,13 @@ from bubble_pattern_addon.core.limits import _alike
 from bubble_pattern_addon.core.mesh import Floats
 from bubble_pattern_addon.core.metric import Constant, Described
 from bubble_pattern_addon.core.packing.pack import pack_steps
-from bubble_pattern_addon.core.pattern import Pattern
+from bubble_pattern_addon.core.pattern import Pattern, all_bubbles
+from bubble_pattern_addon.core.pattern import joined as end_to_end
 from bubble_pattern_addon.core.pipeline import pattern_steps
 from bubble_pattern_addon.core.progress import drive
 from bubble_pattern_addon.core.quality import measure, neighbours
 from bubble_pattern_addon.core.recipe import (
+    Limits,
     Packing,
     Recipe,
     Shaping,
@@ -331,6 +333,33 @@ def test_partners_that_ask_for_the_same_are_limited_alike():
     size, stays = _alike(partners, wished, diameter, kept)
     assert size.tolist() == [1.8, 1.8, 1.5, 2.5]
     assert stays.tolist() == [False, False, True, False]
+
+
+def test_patterns_end_to_end_keep_their_partners():
+    _, one = packed(island(), "x")
+    _, other = packed(SHAPES["disc"](), "off")
+    both = end_to_end([one, one])
+    assert both.symmetry == "x"
+    assert np.array_equal(both.partners[: len(one)], one.partners)
+    assert np.array_equal(both.partners[len(one) :], one.partners + len(one))
+    mixed = end_to_end([one, other])
+    assert mixed.symmetry is None
+    assert mixed.partners is None
+
+
+def test_what_is_left_out_is_left_out_on_both_sides_and_may_come_back():
+    region, whole = packed(island(), "x")
+    recipe = Recipe(
+        packing=Packing(pitch=Constant(3.0), symmetry="x"),
+        shaping=Shaping(diameter=Constant(2.9)),
+        limits=Limits(min_web=0.05, min_diameter=2.8),
+    )
+    pattern = drive(pattern_steps(region, recipe))
+    assert pattern.dropped is not None
+    assert np.isin(pattern.partners, pattern.ids).all()
+    row = np.searchsorted(pattern.ids, pattern.partners)
+    assert np.ptp(pattern.diameter[row], axis=1).max() == 0
+    assert np.array_equal(all_bubbles(pattern).partners, whole.partners)
 
 
 # --- the groups
