@@ -274,7 +274,7 @@ def adding(repeats: int) -> None:
     print(
         "\n## Adding\n\n32-sided through-holes. Ours: everything, the base looked through for the first "
         "time; again: the same\nbase once more, known to be sound. Bare: the subtraction alone, both solids "
-        "built beforehand; built: with their\nbuilding. Seconds are the least of several runs in turn; ratio: "
+        "built beforehand; built: with their\nbuilding. Seconds are the least of several in turn; ratio: "
         "ours by bare; cores: the same in seconds of all\ncores together."
     )
     print_head(

@@ -182,10 +182,23 @@ class BUBBLE_PATTERN_PT_packing(SettingsPanel, bpy.types.Panel):
         column.prop(settings, "orientation")
         if settings.orientation == 'GIVEN':
             column.prop(settings, "rows_along", text=" ")
+        draw_symmetry(column, settings)
         column.prop(settings, "seed")
         column.prop(settings, "parts")
         if settings.parts:
             column.prop(settings, "gap")
+
+
+def draw_symmetry(column: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    """The symmetry, and what is known only of some."""
+    column.prop(settings, "symmetry")
+    if settings.symmetry == 'ROTATE':
+        column.prop(settings, "symmetry_fold")
+        column.prop(settings, "symmetry_axis")
+    if settings.symmetry != 'OFF':
+        column.prop(settings, "use_symmetry_centre")
+    if settings.symmetry != 'OFF' and settings.use_symmetry_centre:
+        column.prop(settings, "symmetry_centre", text=" ")
 
 
 class BUBBLE_PATTERN_PT_solver(SettingsPanel, bpy.types.Panel):

@@ -15,6 +15,7 @@ from bpy.props import (
     StringProperty,
 )
 
+from ..core.isometries import MOST_FOLD
 from ..core.recipe import FILL, Packing, Shaping
 from .field_properties import SIZE, BubblePatternField, length_property
 
@@ -131,6 +132,56 @@ class BubblePatternSettings(bpy.types.PropertyGroup):
         size=3,
         subtype='XYZ',
         default=(1.0, 0.0, 0.0),
+        update=repack,
+    )
+    symmetry: EnumProperty(
+        name="Symmetry",
+        description="Make the arrangement symmetric where the region is, in the axes of the base",
+        items=(
+            ('OFF', "Off", "No symmetry but what comes by itself"),
+            ('AUTO', "Auto", "Whichever symmetry the region has"),
+            ('X', "Mirror X", "One half the mirror image of the other, left and right"),
+            ('Y', "Mirror Y", "One half the mirror image of the other, front and back"),
+            ('Z', "Mirror Z", "One half the mirror image of the other, top and bottom"),
+            ('XY', "Mirror X and Y", "Every quarter the mirror image of its neighbors"),
+            ('XZ', "Mirror X and Z", "Every quarter the mirror image of its neighbors"),
+            ('YZ', "Mirror Y and Z", "Every quarter the mirror image of its neighbors"),
+            ('ROTATE', "Rotate", "The same again after a part of a turn"),
+        ),
+        default='OFF',
+        update=repack,
+    )
+    symmetry_fold: IntProperty(
+        name="Fold",
+        description="How many times the arrangement repeats in one turn",
+        default=3,
+        min=2,
+        max=MOST_FOLD,
+        update=repack,
+    )
+    symmetry_axis: EnumProperty(
+        name="Axis",
+        description="What the arrangement turns about",
+        items=(
+            ('REGION', "Region", "The way the region faces"),
+            ('X', "X", "The X axis of the base"),
+            ('Y', "Y", "The Y axis of the base"),
+            ('Z', "Z", "The Z axis of the base"),
+        ),
+        default='REGION',
+        update=repack,
+    )
+    use_symmetry_centre: BoolProperty(
+        name="Own Center",
+        description="Mirror or turn about a point of your choice, not the middle of the region",
+        default=False,
+        update=repack,
+    )
+    symmetry_centre: FloatVectorProperty(
+        name="Center",
+        description="Point of the mirror planes or of the axis, in the coordinates of the base",
+        size=3,
+        subtype='TRANSLATION',
         update=repack,
     )
     integrator: EnumProperty(

@@ -44,6 +44,8 @@ def recipe_of(settings: Any) -> Recipe:
                 if settings.orientation == 'GIVEN'
                 else settings.orientation.lower()
             ),
+            symmetry=symmetry_word(settings),
+            symmetry_centre=point_of(settings.symmetry_centre) if settings.use_symmetry_centre else None,
             integrator=settings.integrator.lower(),
             seed=settings.seed,
             iterations=settings.iterations,
@@ -97,6 +99,26 @@ def take_recipe(settings: Any, recipe: Recipe) -> None:
     settings.live = live
 
 
+def symmetry_word(settings: Any) -> str:
+    """The recipe's word for the symmetry of the settings."""
+    if settings.symmetry != 'ROTATE':
+        return settings.symmetry.lower()
+    axis = "" if settings.symmetry_axis == 'REGION' else f" {settings.symmetry_axis.lower()}"
+    return f"rotate {settings.symmetry_fold}{axis}"
+
+
+def take_symmetry(settings: Any, packing: Packing) -> None:
+    """Set the settings of symmetry."""
+    kind, *turn = packing.symmetry.split()
+    settings.symmetry = kind.upper()
+    if turn:
+        settings.symmetry_fold = int(turn[0])
+        settings.symmetry_axis = turn[1].upper() if len(turn) > 1 else 'REGION'
+    settings.use_symmetry_centre = packing.symmetry_centre is not None
+    if packing.symmetry_centre is not None:
+        settings.symmetry_centre = packing.symmetry_centre
+
+
 def take_packing(settings: Any, packing: Packing) -> None:
     """Set the settings of step 1."""
     if isinstance(packing.pitch, Constant):
@@ -110,6 +132,7 @@ def take_packing(settings: Any, packing: Packing) -> None:
     else:
         settings.orientation = 'GIVEN'
         settings.rows_along = packing.orientation
+    take_symmetry(settings, packing)
     settings.integrator = packing.integrator.upper()
     settings.seed = packing.seed
     settings.iterations = packing.iterations

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -365,6 +366,25 @@ def test_a_recipe_goes_to_the_settings_and_back(table: Any) -> None:
         assert settings.diameter_field.kind in wanted
         assert settings.live
         assert same(unchecked(settings), recipe)
+
+
+@pytest.mark.parametrize("word", ["off", "auto", "x", "yz", "rotate 3", "rotate 6 z"])
+@pytest.mark.parametrize("centre", [None, (0.5, 0.25, -1.0)])
+def test_symmetry_goes_to_the_settings_and_back(word: str, centre: tuple[float, float, float] | None) -> None:
+    settings = laid().bubble_pattern
+    recipe = settings_recipe.recipe_of(settings)
+    packing = replace(recipe.packing, symmetry=word, symmetry_centre=centre)
+    settings_recipe.take_packing(settings, packing)
+    assert settings_recipe.recipe_of(settings).packing == packing
+
+
+def test_a_symmetric_pattern_is_laid_from_the_settings() -> None:
+    pattern = laid()
+    pattern.bubble_pattern.symmetry = 'X'
+    where = local(pattern)
+    away = np.linalg.norm(where[:, None] * [-1, 1, 1] - where[None], axis=2).min(axis=1)
+    assert len(where) > 50
+    assert away.max() < 1e-3 * pattern.bubble_pattern.pitch
 
 
 KIND_NAMES = ('LINEAR', 'RADIAL', 'EDGE', 'DISTANCE', 'ATTRIBUTE', 'IMAGE')
