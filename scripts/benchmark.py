@@ -273,9 +273,9 @@ def adding(repeats: int) -> None:
     """`part_steps` with everything it does against the bare subtraction of the same cutters."""
     print(
         "\n## Adding\n\n32-sided through-holes. Ours: everything, the base looked through for the first "
-        "time; again: the same base once\nmore, known to be sound. Bare: the subtraction alone, both solids built "
-        "beforehand; built: with their building.\nSeconds are the least of several runs in turn; ratio: ours by "
-        "bare; cores: the same in seconds of all cores together."
+        "time; again: the same base once\nmore, known to be sound. Bare: the subtraction alone, both solids "
+        "built beforehand; built: with their building.\nSeconds are the least of several runs in turn; "
+        "ratio: ours by bare; cores: the same in seconds of all cores together."
     )
     print_head(
         "| base | triangles | holes | ours, s | again, s | bare, s | built, s | ratio | cores "
