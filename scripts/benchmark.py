@@ -273,9 +273,9 @@ def adding(repeats: int) -> None:
     """`part_steps` with everything it does against the bare subtraction of the same cutters."""
     print(
         "\n## Adding\n\n32-sided through-holes. Ours: everything, the base looked through for the first "
-        "time; again: the same\nbase once more, known to be sound. Bare: the subtraction alone, both solids "
-        "built beforehand; built: with their\nbuilding. Seconds are the least of several in turn; ratio: "
-        "ours by bare; cores: the same in seconds of all\ncores together."
+        "time; again: the same base once\nmore, known to be sound. Bare: the subtraction alone, both solids "
+        "built beforehand; built: with their building.\nSeconds are the least of several runs in turn; "
+        "ratio: ours by bare; cores: the same in seconds of all cores together."
     )
     print_head(
         "| base | triangles | holes | ours, s | again, s | bare, s | built, s | ratio | cores "
@@ -394,6 +394,10 @@ def peak_memory(*arguments: str) -> str:
 
 def own_peak() -> float:
     """Largest resident size of this process so far, in MiB."""
+    status = Path("/proc/self/status")
+    if status.is_file():
+        # Linux lets a process start with the size of the one that started it, but not here
+        return int(status.read_text().split("VmHWM:")[1].split()[0]) / 2**10
     import resource
 
     unit = 1 if sys.platform == "darwin" else 1024

@@ -176,7 +176,7 @@ def subtract(base: Mesh, face: Ints, cutters: Cutters) -> Cut:
         runs = zip(names, ends[:-1], ends[1:], strict=True)
         return [rows[start:end] for owner, start, end in runs if owner == name]
 
-    order = np.concatenate([*of(first, triangles), *of(first + 1, triangles)])
+    order = np.concatenate([triangles[:0], *of(first, triangles), *of(first + 1, triangles)])
     on_base, on_cutters = (np.concatenate([none, *of(name, identity)]) for name in (first, first + 1))
     return Cut(Mesh(np.array(out.vert_properties), order), on_base, on_cutters)
 

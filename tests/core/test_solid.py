@@ -1,5 +1,6 @@
 """Laws of step 3: what a part is, whatever the base and the pattern."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -525,3 +526,18 @@ def test_any_plate_however_it_lies(width, depth, thickness, share, pitch, sides,
     assert_good(part, base, 0 if blind else len(pattern))
     taken = len(pattern) * polygon_area(diameter, sides) * thickness * (0.5 if blind else 1)
     assert part.check.removed_volume == pytest.approx(taken, rel=1e-6)
+
+
+def test_a_base_that_is_cut_away_altogether_leaves_nothing(monkeypatch):
+    base, pattern = plate(), laid([[0, 0, 0]], UP, 3, 1.8)
+    whole = solid.subtract
+
+    def all_of_it(mesh, face, cutters):
+        lid = box((-99, -99, -99), (99, 99, 99))
+        return whole(mesh, face, replace(cutters, mesh=lid, facet=np.zeros(12, dtype=np.int64)))
+
+    monkeypatch.setattr(solid, "subtract", all_of_it)
+    part = make(base, pattern)
+    assert len(part.mesh.triangles) == 0
+    assert not part.check.watertight
+    assert not part.check.unchanged
