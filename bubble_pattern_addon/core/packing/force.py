@@ -61,10 +61,14 @@ def find_pairs(charts: Charts, points: Floats, row: Ints, pitch: Floats, skin: f
     points: (n, 3) positions; row: (n,) region rows; pitch: (n,)
     """
     at, reach = signature(charts.region, points, row, float(pitch.max())), REACH + skin
-    # Bubbles are searched for in classes of like size, so that small ones among large list no hundreds.
-    size = np.floor(np.log(pitch / pitch.min()) / np.log(CLASS)).astype(np.int64)
-    found = [_pairs_of_class(at, pitch, size, number, reach) for number in np.unique(size)]
-    first, second = np.concatenate(found, axis=1)
+    if pitch.max() < CLASS * pitch.min():
+        tree = cKDTree(at, balanced_tree=False, compact_nodes=False)
+        first, second = tree.query_pairs(reach * float(pitch.max()), output_type="ndarray").T
+    else:
+        # Bubbles are searched for in classes of like size, so that small ones among large list no hundreds.
+        size = np.floor(np.log(pitch / pitch.min()) / np.log(CLASS)).astype(np.int64)
+        found = [_pairs_of_class(at, pitch, size, number, reach) for number in np.unique(size)]
+        first, second = np.concatenate(found, axis=1)
     stable = (pitch[first] + pitch[second]) / 2
     away = points[first] - points[second]
     close = np.einsum("mc,mc->m", away, away) < (reach * stable) ** 2
