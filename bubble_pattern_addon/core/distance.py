@@ -34,13 +34,17 @@ def index_segments(segments: Floats) -> Segments:
     return Segments(pieces, cKDTree(pieces.mean(axis=1)), half)
 
 
-def distance_to(segments: Segments, points: Floats) -> Floats:
-    """Distance of every one of `points` (n, 3) to the nearest segment, (n,).
+def distance_to(segments: Segments, points: Floats, within: float = np.inf) -> Floats:
+    """Distance of every one of `points` (n, 3) to the nearest segment, (n,); those farther than `within` may
+    be told as infinitely far.
 
     Exact: the pieces with the nearest middles are measured, more of them until none left out can be nearer.
     """
     best = np.full(len(points), np.inf)
     open_rows = np.arange(len(points))
+    if np.isfinite(within):
+        bound = (within + segments.half) * (1 + 1e-9)
+        open_rows = np.flatnonzero(np.isfinite(segments.tree.query(points, distance_upper_bound=bound)[0]))
     k = min(4, len(segments.pieces))
     while len(open_rows):
         step = max(1, 1_000_000 // k)
@@ -55,13 +59,13 @@ def distance_to(segments: Segments, points: Floats) -> Floats:
     return best
 
 
-def boundary_distance(points: Floats, segments: Floats) -> Floats:
+def boundary_distance(points: Floats, segments: Floats, within: float = np.inf) -> Floats:
     """Distance of every one of `points` (n, 3) to the nearest of the `segments` (S, 2, 3), (n,); inf when
-    there are none.
+    there are none. Those farther than `within` may be told as infinitely far.
     """
     if not len(segments) or not len(points):
         return np.full(len(points), np.inf)
-    return distance_to(index_segments(segments), points)
+    return distance_to(index_segments(segments), points, within)
 
 
 def _short_pieces(segments: Floats) -> Floats:

@@ -63,8 +63,10 @@ def _alike(partners: Ints, wished: Floats, diameter: Floats, kept: Bools) -> tup
 
 def within_limits(bubbles: Pattern, region: Region, limits: Limits) -> tuple[Floats, Bools]:
     """The largest diameters (n,) that the rule above allows, and which features are kept, (n,)."""
-    edge = boundary_distance(bubbles.position, region.boundary_segments)
     margin = np.maximum(limits.min_margin, LEAST_WEB / 2 * bubbles.pitch)
+    # whoever is farther from the boundary than this keeps every margin
+    clear = 1.01 * float((bubbles.diameter / 2 + margin).max(initial=0.0))
+    edge = boundary_distance(bubbles.position, region.boundary_segments, clear)
     most = np.minimum(bubbles.diameter, 2 * (edge - margin) * (1 - ROUNDING))
     smallest = max(limits.min_diameter, 0.0)
     kept = (most >= smallest) & (most > 0)

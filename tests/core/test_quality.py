@@ -325,3 +325,12 @@ def test_measuring_a_pattern_takes_the_region_and_the_rows_from_it(case: Case):
     quality = measure(pattern, region)
     assert quality.six == 1.0
     assert quality.rim_cv == pytest.approx(0.0, abs=1e-9)
+
+
+def test_distances_within_a_reach_are_those_without_it():
+    chance = np.random.default_rng(1)
+    segments = chance.uniform(-5, 5, (40, 2, 3))
+    points = chance.uniform(-6, 6, (500, 3))
+    full, near = boundary_distance(points, segments), boundary_distance(points, segments, 1.0)
+    assert np.array_equal(near[full <= 1.0], full[full <= 1.0])
+    assert (near >= full).all()
