@@ -75,11 +75,6 @@ def _pair_up(ranked: Ints) -> bool:
     return bool(np.all(second == first + 1) and not np.any(first & 1) and np.all(second[:-1] < first[1:]))
 
 
-def is_closed(triangles: Ints) -> bool:
-    """Is every edge shared by exactly two of `triangles`, (T, 3), that run along it in opposite ways?"""
-    return _pair_up(np.sort(edge_keys(triangles)[0]))
-
-
 def opposites(triangles: Ints) -> Ints | None:
     """For each directed edge of a closed surface the one that runs back along it, (3 T,); None where it is
     not closed. Edges are numbered as in `edge_keys`: edge k of triangle t is k T + t.
@@ -126,18 +121,6 @@ def _vertex_shells(low: Ints, high: Ints) -> tuple[Ints, Bools]:
     present = np.zeros(shells, dtype=bool)
     present[label[used]] = True
     return np.where(used, (np.cumsum(present) - 1)[label], -1), used
-
-
-def euler_number(triangles: Ints) -> int:
-    """V - E + F of the closed surface `triangles`, (T, 3), whose edges are 3/2 of its faces."""
-    used = np.zeros(int(triangles.max()) + 1 if len(triangles) else 0, dtype=bool)
-    used[triangles] = True
-    return int(used.sum()) - len(triangles) * 3 // 2 + len(triangles)
-
-
-def shell_volumes(mesh: Mesh) -> Floats:
-    """Signed volume of every connected shell, (shells,); a cavity's is negative."""
-    return measure(mesh).volumes
 
 
 def patch_euler(patches: Ints, owner: Ints, others: Ints, count: int) -> Floats:

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bubble_pattern_addon.core.closed import euler_number, is_closed, shell_volumes
+from bubble_pattern_addon.core.closed import measure
 from bubble_pattern_addon.core.errors import RecipeError
 from bubble_pattern_addon.core.feature import make_cutters, sides
 from bubble_pattern_addon.core.recipe import Feature
@@ -24,12 +24,13 @@ def test_cutters_are_closed_prisms_of_the_asked_size(diameters, count, top, bott
     position = np.stack([np.arange(number) * 60.0, np.zeros(number), np.zeros(number)], axis=1)
     pattern, feature = laid(position, (1, 2, 3), 1, diameter), Feature(sides=count)
     cutters = make_cutters(pattern, feature, np.arange(number), np.full(number, top), np.full(number, bottom))
-    assert is_closed(cutters.mesh.triangles)
-    assert euler_number(cutters.mesh.triangles) == 2 * number
+    found = measure(cutters.mesh)
+    assert found.closed
+    assert found.euler == 2 * number
     expected = [
         polygon_area(d, s) * (top + bottom) for d, s in zip(diameter, sides(feature, diameter), strict=True)
     ]
-    assert np.allclose(np.sort(shell_volumes(cutters.mesh)), np.sort(expected), rtol=1e-6)
+    assert np.allclose(np.sort(found.volumes), np.sort(expected), rtol=1e-6)
 
 
 def test_every_facet_is_flat_and_belongs_to_its_feature():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bubble_pattern_addon.core.closed import is_closed, shell_volumes
+from bubble_pattern_addon.core.closed import measure
 from bubble_pattern_addon.core.splitting import MANY, split_crowded
 from tests.core.bases import box, moved
 
@@ -21,8 +21,8 @@ def test_a_crowded_triangle_is_split_inside_only(matrix):
     split, face = split_crowded(base, np.full(len(place), crowded), place, np.full(len(place), 0.2))
     pieces = np.flatnonzero(face == crowded)
     assert MANY / 8 < len(pieces) < MANY
-    assert is_closed(split.triangles)
-    assert shell_volumes(split) == pytest.approx(shell_volumes(base))
+    assert measure(split).closed
+    assert measure(split).volumes == pytest.approx(measure(base).volumes)
     whole = face != crowded
     assert np.array_equal(split.triangles[whole], base.triangles[face[whole]])
     assert np.array_equal(split.vertices[:8], base.vertices)
