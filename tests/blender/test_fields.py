@@ -15,7 +15,7 @@ bpy = pytest.importorskip("bpy", reason="needs the bpy module: python scripts/te
 
 from mathutils import Euler, Matrix, Vector  # noqa: E402
 
-from bubble_pattern_addon.blender import (
+from bubble_pattern_addon.blender import (  # noqa: E402
     field_panels,
     field_properties,
     generation,
