@@ -203,7 +203,7 @@ def reshape(obj: bpy.types.Object, context: bpy.types.Context) -> None:
         drive(update_steps(obj, context))
         return
     pattern = reshaped(read_pattern(obj, source.base.mesh), source.region, recipe, source.surroundings)
-    quality = Quality(settings.six, 0.0, 0.0, settings.gap_min, 0.0)
+    quality = Quality(settings.six, 0.0, 0.0, settings.gap_min, 0.0, 0.0)
     laid = measured(pattern, source.region, quality, start)
     write_sizes(obj, pattern)
     note(settings, source, recipe, laid)

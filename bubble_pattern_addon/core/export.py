@@ -53,9 +53,9 @@ def make_report(region: Region, pattern: Pattern, part: Part, seconds: Mapping[s
     """The figures of a run in the unit of the base, ready for JSON; one with nothing to measure is None.
 
     features, watertight, genus, volume, open_area, min_web, min_margin, quality{six, psi6, gap_cv, gap_min,
-    rim_cv} and seconds{region, pack, shape, add}; further symmetry, the recipe's word for the one that the
-    pattern has, or "off", wall{min, max}, the near wall's thickness at the
-    features, limits (see limits_report), problems, one sentence each, empty when the part is good, and notes,
+    rim_cv, void} and seconds{region, pack, shape, add}; further symmetry, the recipe's word for the one that
+    the pattern has, or "off", wall{min, max}, the near wall's thickness at the features, limits (see
+    limits_report), problems, one sentence each, empty when the part is good, and notes,
     likewise, on what does no harm.
     """
     figures: Quality = measure(pattern, region)
@@ -84,6 +84,7 @@ def make_report(region: Region, pattern: Pattern, part: Part, seconds: Mapping[s
             "gap_cv": figures.gap_cv,
             "gap_min": figures.gap_min,
             "rim_cv": figures.rim_cv,
+            "void": figures.void,
         },
         "seconds": {stage: round(value, 4) for stage, value in seconds.items()},
         "problems": list(part.check.problems),

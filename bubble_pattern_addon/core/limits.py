@@ -19,9 +19,9 @@ from scipy.spatial import cKDTree
 
 from .distance import boundary_distance
 from .mesh import Bools, Floats, Ints
+from .neighbours import SHEET_TURN, same_sheet
 from .packing.crowding import uncrowded
 from .pattern import Pattern, split
-from .quality import SHEET_TURN, same_sheet
 from .recipe import Limits
 from .region import Region
 
