@@ -144,7 +144,7 @@ def _bounds_cell(flat: Floats, seen: Bools) -> tuple[Bools, Floats, Floats, Floa
     cross = np.where(seen[:, None, :], cross, np.nan)  # a nan bounds nothing
     level = np.abs(cross) < 1e-12
     hidden = (level & (free < -1e-12)).any(axis=2)  # straight behind a nearer one
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         bound = free / cross
     high = np.where(cross >= 1e-12, bound, np.inf).min(axis=2)
     low = np.where(cross <= -1e-12, bound, -np.inf).max(axis=2)

@@ -10,13 +10,17 @@ from .mesh import Bools, Floats, Ints
 from .neighbours import SHEET_TURN, Neighbours, tangent_axes
 
 # Smaller circles, in pitches, are no voids: three neighbours of a square are 0.71 from its middle.
-LEAST = 0.75
+LEAST = 0.72
 # Half-way between two neighbours farther apart than this, in pitches, there may be a void as well.
 WIDE = 1.2
 # A place belongs to the void when it is at least this share of the first row's distance from the boundary.
 CLEAR = 0.95
+# Bubbles farther from the middle than the nearest by no more than this factor touch the void too, if it is
+# LARGE, in pitches, by no more than the other; they surround it when no angle between two is wider than that.
+TOUCHING, TOUCHING_LARGE, LARGE = 1.03, 1.4, 1.2
+SURROUNDED = np.radians(190.0)
 # So many of the nearest bubbles are asked who is nearest on the same sheet.
-NEAREST = 8
+NEAREST = 12
 
 
 def largest_void(
@@ -35,17 +39,17 @@ def largest_void(
 
     position: (n, 3); normal: (n, 3) unit; pitch: (n,); near: their neighbours; boundary_segments: (S, 2, 3)
     """
-    middle, owner = _middles(position, normal, pitch, near)
-    if not len(middle):
-        return np.nan
-    share = _emptiness(middle, normal[owner], position, normal, pitch)
-    # Only what could be a void is worth asking whether it is inside, but there is always a largest.
+    every_middle, every_owner = _middles(position, normal, pitch, near)
+    beside = np.linalg.norm(every_middle - position[every_owner], axis=1) / pitch[every_owner]
+    # Only what could be a void is worth a closer look, but there is always a largest.
     for least in (LEAST, 0.0):
-        wide = np.flatnonzero(share > least)
-        clear = CLEAR * float(rim.min(initial=0.5)) * pitch[owner[wide]]
-        inside = _inside(middle[wide], normal[owner[wide]], boundary_segments, clear)
-        if inside.any():
-            return float(share[wide[inside]].max())
+        middle, owner = every_middle[beside > least], every_owner[beside > least]
+        clear = CLEAR * float(rim.min(initial=0.5)) * pitch[owner]
+        inside = _inside(middle, normal[owner], boundary_segments, clear)
+        middle, owner = middle[inside], owner[inside]
+        share = _emptiness(middle, position[owner], normal[owner], position, normal, pitch)
+        if share.any():
+            return float(share.max())
     return np.nan
 
 
@@ -63,23 +67,43 @@ def _middles(position: Floats, normal: Floats, pitch: Floats, near: Neighbours) 
     return position[owner] + np.einsum("ma,mac->mc", flat, axes), owner
 
 
-def _emptiness(places: Floats, facing: Floats, position: Floats, normal: Floats, pitch: Floats) -> Floats:
+def _emptiness(
+    places: Floats, beside: Floats, facing: Floats, position: Floats, normal: Floats, pitch: Floats
+) -> Floats:
     """Distance from places (m, 3) on sheets that are `facing` (m, 3) to the nearest bubble there, as a share
-    of the mean pitch of the three nearest, (m,).
+    of the mean pitch of the three nearest, (m,); 0 for places that the nearest ones do not surround: from
+    there a larger circle is farther on.
+
+    No farther than to the bubble each is `beside` (m, 3), in whose tangent plane it is: where the surface
+    bends or folds, others seem farther from there than they are.
     """
+    if not len(places):
+        return np.empty(0)
     count = min(NEAREST, len(position))
     distance, other = cKDTree(position).query(places, np.arange(1, count + 1))
-    away = np.einsum("mc,mkc->mk", facing, normal[other]) <= SHEET_TURN
-    distance[away] = np.inf
-    order = np.argsort(distance, axis=1, kind="stable")[:, :3]
-    nearest = np.take_along_axis(other, order, axis=1)
-    there = np.isfinite(np.take_along_axis(distance, order, axis=1))
-    size = np.where(there, pitch[nearest], 0.0).sum(axis=1) / np.maximum(there.sum(axis=1), 1)
-    return np.where(there[:, 0], distance.min(axis=1), 0.0) / np.maximum(size, 1e-300)
+    distance[np.einsum("mc,mkc->mk", facing, normal[other]) <= SHEET_TURN] = np.inf
+    order = np.argsort(distance, axis=1, kind="stable")
+    distance, other = np.take_along_axis(distance, order, axis=1), np.take_along_axis(other, order, axis=1)
+    there = np.isfinite(distance)
+    size = np.where(there, pitch[other], 0.0)[:, :3].sum(axis=1) / np.maximum(there[:, :3].sum(axis=1), 1)
+    nearest = np.minimum(distance[:, 0], np.linalg.norm(places - beside, axis=1))
+    # the neighbours across a large void are not known, and its middle only nearly
+    reach = np.where(nearest > LARGE * size, TOUCHING_LARGE, TOUCHING)
+    touching = there & (distance <= reach[:, None] * distance[:, :1])
+    flat = np.einsum("mkc,mac->mka", position[other] - places[:, None], tangent_axes(facing))
+    surrounded = _widest_gap(np.arctan2(flat[..., 1], flat[..., 0]), touching) < SURROUNDED
+    return np.where(surrounded, nearest, 0.0) / np.maximum(size, 1e-300)
+
+
+def _widest_gap(angle: Floats, counts: Bools) -> Floats:
+    """Widest angle, (m,), between one of the directions `angle` (m, k) that count and the next one round."""
+    last = np.max(np.where(counts, angle, -np.pi), axis=1)
+    turn = np.sort(np.where(counts, angle, last[:, None]), axis=1)
+    return np.maximum(np.diff(turn, axis=1).max(axis=1, initial=0.0), turn[:, 0] + 2 * np.pi - last)
 
 
 def _inside(places: Floats, normal: Floats, segments: Floats, clear: Floats) -> Bools:
-    """Which places (m, 3) are left of the boundary `segments` (S, 2, 3) and not nearer to it than `clear` (m,)."""
+    """Which places (m, 3) are left of the boundary `segments` (S, 2, 3) and `clear` (m,) of it."""
     if not len(segments) or not len(places):
         return np.ones(len(places), dtype=bool)
     index = index_segments(segments)
