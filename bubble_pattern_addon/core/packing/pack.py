@@ -24,7 +24,7 @@ from .lattice import grow
 from .narrows import in_the_narrows
 from .orbits import orbit_sizes, settled_leaders, symmetric_start, with_followers
 from .plane import fills_its_box, lay
-from .population import control, pressed_out
+from .population import control
 from .relax import relax
 from .rim import (
     FirstRow,
@@ -54,7 +54,7 @@ TURNS = (0.0, 15.0, 30.0, 45.0)
 CRAMPED = 1.02
 # Rounds of relaxation and population control, and how many steps each may take; the last phases' steps.
 ROUNDS = 3
-STIFF_STEPS = 45
+STIFF_STEPS, LAST_ROUNDS = 45, 4
 
 
 def pack_steps(region: Region, packing: Packing) -> Steps[tuple[Ground, Bubbles]]:
@@ -128,15 +128,16 @@ def _settled(
         if not changed:
             break
     yield Progress("Evening out the gaps", 0.8)
-    while True:
+    for number in range(LAST_ROUNDS):
         local = local_pitch(ground, bubbles)
         size, stiffness = _filling(ground, bubbles, local), 1.0 + STIFFNESS
         bubbles, _ = relax(ground, bubbles, size, STIFF_STEPS, packing.tolerance, stiff_law, stiffness)
-        kept = ~pressed_out(ground, bubbles, local_pitch(ground, bubbles))
-        if kept.all():
+        # What stiff contacts have squeezed through the first row has no place between it and the boundary,
+        # and what these have opened another bubble may fit into.
+        local, filling = local_pitch(ground, bubbles), number + 1 < LAST_ROUNDS
+        bubbles, changed = control(ground, bubbles, local, last=True, filling=filling)
+        if not changed:
             break
-        # What stiff contacts have squeezed through the first row has no place between it and the boundary.
-        bubbles = Bubbles(bubbles.spots.take(kept), bubbles.fixed)
     if ground.symmetry is not None:
         bubbles = with_followers(ground, settled_leaders(ground, bubbles))
     return bubbles
