@@ -118,10 +118,11 @@ class Feature:
 
     def with_fields(self, change: Callable[[Described], Described]) -> Feature:
         """The feature with each of its fields changed."""
-        sizes: dict[str, Any] = {name: getattr(self, name) for name in SIZES}
-        return replace(
-            self, **{name: change(size) for name, size in sizes.items() if isinstance(size, Described)}
-        )
+        sizes = {name: getattr(self, name) for name in SIZES}
+        changed: dict[str, Any] = {
+            name: change(size) for name, size in sizes.items() if isinstance(size, Described)
+        }
+        return replace(self, **changed)
 
 
 def nouns(kind: str, count: int) -> str:

@@ -5,6 +5,7 @@ ask.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -105,7 +106,7 @@ def _unit(feature: Feature, aspect: Floats, count: int) -> Outlines:
         inner = np.full(1, np.cos(np.pi / feature.corners))
         return _cornered(corners, feature.rounding * inner, inner, count)
     corners = counter_clockwise(np.array(feature.points))
-    room = largest_inset(corners) * np.linalg.norm(corners, axis=1).max()
+    room = _curve_room(feature.points) * np.linalg.norm(corners, axis=1).max()
     return _cornered(corners[None], np.zeros(1), np.full(1, room), count)
 
 
@@ -272,6 +273,11 @@ def largest_inset(points: Floats) -> float:
         else:
             high = middle
     return low
+
+
+@lru_cache(16)
+def _curve_room(points: tuple[tuple[float, float], ...]) -> float:
+    return largest_inset(np.array(points))
 
 
 def _simple(corners: Floats) -> bool:
