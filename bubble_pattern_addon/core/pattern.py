@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -38,6 +38,7 @@ class Pattern:
     axis: (n, 3) unit vectors along which the features stand, None for the normals
     heading: (n, 3) unit vectors square to the axes, the features' x axes, None for the tangents
     sizes: (n,) by the name of a feature's size that varies over the region, such as its depth
+    share: (n,) share of the circle of its diameter that a feature takes, None for all of it
     """
 
     places: Places
@@ -56,6 +57,7 @@ class Pattern:
     axis: Floats | None = None
     heading: Floats | None = None
     sizes: Mapping[str, Floats] = field(default_factory=dict)
+    share: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.pitch)
@@ -154,8 +156,9 @@ def _end_to_end(parts: Sequence[Pattern]) -> Pattern:
         packing_notes=tuple(dict.fromkeys(note for part in parts for note in part.packing_notes)),
         symmetry=parts[0].symmetry if symmetric else None,
         partners=column("partners") if symmetric else None,
-        axis=_given(parts, "axis", "normal"),
-        heading=_given(parts, "heading", "tangent"),
+        axis=_given(parts, "axis", lambda part: part.normal),
+        heading=_given(parts, "heading", lambda part: part.tangent),
+        share=_given(parts, "share", lambda part: np.ones(len(part))),
         # what only some of the parts have varies with no field that all have
         sizes={
             name: np.concatenate([part.sizes[name] for part in parts])
@@ -165,13 +168,13 @@ def _end_to_end(parts: Sequence[Pattern]) -> Pattern:
     )
 
 
-def _given(parts: Sequence[Pattern], name: str, otherwise: str) -> Floats | None:
+def _given(parts: Sequence[Pattern], name: str, otherwise: Callable[[Pattern], Floats]) -> Floats | None:
     """A column that a part may lack, where it is as `otherwise`; None where all lack it."""
     given = [getattr(part, name) for part in parts]
     if all(column is None for column in given):
         return None
     return np.concatenate(
-        [getattr(part, otherwise) if one is None else one for one, part in zip(given, parts, strict=True)]
+        [otherwise(part) if one is None else one for one, part in zip(given, parts, strict=True)]
     )
 
 
@@ -188,5 +191,6 @@ def take(pattern: Pattern, which: Bools | Ints) -> Pattern:
         axis=None if pattern.axis is None else pattern.axis[which],
         heading=None if pattern.heading is None else pattern.heading[which],
         sizes={name: values[which] for name, values in pattern.sizes.items()},
+        share=None if pattern.share is None else pattern.share[which],
         dropped=None,
     )

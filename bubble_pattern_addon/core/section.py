@@ -55,9 +55,9 @@ def ring_counts(feature: Feature, sizes: FeatureSizes, extent: Extent, radius: F
     0 where there is no rounding.
     """
     if capped(feature):
-        rise = _rise(feature, extent)
+        rise = rise_of(feature, extent)
         ball = np.maximum((radius**2 + rise**2) / (2 * rise), rise)
-        return rings(ball, _opening(radius, rise), chord)
+        return rings(ball, opening(radius, rise), chord)
     if feature.rim == "fillet":
         return rings(sizes.rim, np.pi / 2 - np.arctan(sizes.draft), chord)
     return np.zeros(len(radius), dtype=np.int64)
@@ -71,7 +71,7 @@ def sections(feature: Feature, sizes: FeatureSizes, extent: Extent, radius: Floa
         return _boss(feature, sizes, extent, count)
     if feature.kind == "bump" and feature.form == "cone":
         return _ended(extent, [extent.top], [0 * radius], True)
-    rise = _rise(feature, extent)
+    rise = rise_of(feature, extent)
     heights, scales = _cap(radius, rise, count)
     up = feature.kind == "bump"
     return _ended(extent, [extent.level + height * (1 if up else -1) for height in heights], scales, up)
@@ -107,12 +107,12 @@ def largest_inset_of(feature: Feature, sizes: FeatureSizes, extent: Extent) -> F
     return sizes.draft * (rise - rim_depth(feature, sizes)) + sizes.rim
 
 
-def _rise(feature: Feature, extent: Extent) -> Floats:
+def rise_of(feature: Feature, extent: Extent) -> Floats:
     """Height of a cap over its edge, (n,)."""
     return extent.top - extent.level if feature.kind == "bump" else extent.bottom + extent.level
 
 
-def _opening(radius: Floats, rise: Floats) -> Floats:
+def opening(radius: Floats, rise: Floats) -> Floats:
     """Angle between the axis and the edge of a cap as seen from its ball's centre, (n,): at most a right
     angle, where the cap is a half ball, or, if it rises higher, half an ellipsoid.
     """
@@ -121,12 +121,12 @@ def _opening(radius: Floats, rise: Floats) -> Floats:
 
 def _cap(radius: Floats, rise: Floats, count: int) -> tuple[list[Floats], list[Floats]]:
     """Heights over its edge and shares of the outline of a cap's `count` rings, the last one its tip."""
-    opening = _opening(radius, rise)
+    whole = opening(radius, rise)
     heights, scales = [], []
     for ring in range(1, count + 1):
-        angle = opening * (1 - ring / count)
-        scales.append(np.sin(angle) / np.sin(opening))
-        heights.append(rise * (np.cos(angle) - np.cos(opening)) / (1 - np.cos(opening)))
+        angle = whole * (1 - ring / count)
+        scales.append(np.sin(angle) / np.sin(whole))
+        heights.append(rise * (np.cos(angle) - np.cos(whole)) / (1 - np.cos(whole)))
     return heights, scales
 
 

@@ -28,7 +28,8 @@ from .progress import Progress, Steps
 from .section import Extent
 from .soundness import SoundBase, sound_base
 from .splitting import split_crowded
-from .stamp import Stamp, make_stamp, make_stamps, stamp_extent, stamp_sizes
+from .stamp import Stamp, make_stamp, make_stamps, stamp_sizes
+from .undercut import undercuts
 from .wall import DEEPEST, Fault, NearWall, near_wall
 
 SAID = 3
@@ -47,6 +48,8 @@ class Part:
     thickness: (n,) thickness of the near wall along each feature's axis, nan where no far side was found
     pierced: (n,) the feature goes through the near wall (False for a blind hole)
     failures: (feature id, sentence) for every feature that was not added
+    undercut: (n,) features that cannot be drawn off along the pull direction, where there is one
+    kind: of the features, "hole", "dimple" or "bump"
     """
 
     mesh: Mesh
@@ -57,16 +60,19 @@ class Part:
     pierced: Bools
     failures: tuple[tuple[int, str], ...]
     check: Check
+    undercut: Bools
+    kind: str
 
 
 @dataclass(frozen=True)
 class Plan:
     """What will be cut or added: the base made ready, its near walls, and the features that can be, as
-    solids; the pattern with their axes for normals.
+    solids; the pattern with their axes for normals, and the surface's normals, (n, 3).
     """
 
     feature: Feature
     pattern: Pattern
+    normal: Floats
     sizes: FeatureSizes
     stamp: Stamp | None
     sound: SoundBase
@@ -146,8 +152,6 @@ def plan_steps(base: Mesh, pattern: Pattern, feature: Feature, stamp: Mesh | Non
     reach = _reaching(pattern, feature)
     wall = near_wall(sound.mesh, sound.tree, reach, *looked_for(feature, sizes, pattern))
     extent, fault = fitted(feature, sizes, pattern, wall, normal)
-    if shape is not None:
-        extent = stamp_extent(feature, sizes, shape, pattern, extent)
     fault[colliding(reach, np.flatnonzero(fault == Fault.NONE), extent.top, extent.bottom)] = Fault.MEETS
     yield Progress("Shaping cutters", 0.2)
     chosen = np.flatnonzero(fault == Fault.NONE)
@@ -157,7 +161,7 @@ def plan_steps(base: Mesh, pattern: Pattern, feature: Feature, stamp: Mesh | Non
         cutters = make_stamps(pattern, feature, sizes, shape, chosen, extent)
     else:
         cutters = make_solids(pattern, feature, sizes, chosen, extent)
-    return Plan(feature, pattern, sizes, shape, sound, wall, fault, extent, cutters)
+    return Plan(feature, pattern, normal, sizes, shape, sound, wall, fault, extent, cutters)
 
 
 def _reaching(pattern: Pattern, feature: Feature) -> Pattern:
@@ -262,6 +266,11 @@ def _judge(plan: Plan, left: Cut) -> Part:
 
     failures = _failures(plan)
     problems, pierced, change = _verdict(plan, shape, failures)
+    undercut = (plan.fault == Fault.NONE) & undercuts(
+        plan.feature, plan.sizes, plan.extent, plan.pattern, plan.normal
+    )
+    if undercut.any():
+        notes = [*notes, _undercut_note(plan, undercut)]
     check = check_part(
         measured.result(),
         sound.measures,
@@ -272,7 +281,17 @@ def _judge(plan: Plan, left: Cut) -> Part:
         change,
         plan.feature.kind,
     )
-    return Part(mesh, source, vertex, untouched, plan.wall.thickness, pierced, failures, check)
+    thickness, kind = plan.wall.thickness, plan.feature.kind
+    return Part(mesh, source, vertex, untouched, thickness, pierced, failures, check, undercut, kind)
+
+
+def _undercut_note(plan: Plan, undercut: Bools) -> str:
+    first = _place(plan, int(np.flatnonzero(undercut)[0]))
+    count = int(undercut.sum())
+    return (
+        f"{nouns(plan.feature.kind, count)} cannot be drawn off along the pull direction, the first is "
+        f"{first}: give more draft, or let the axis follow the pull."
+    )
 
 
 def _verdict(
@@ -281,15 +300,16 @@ def _verdict(
     """What is wrong with single features; which of them pierce the wall, (n,); and by how much they change
     the Euler characteristic of the base.
 
-    shape: (n,) see `_wall_shapes`. A solid of c shells and the characteristic x, each of whose shells meets
-    the surface in one loop, leaves a wall of x - c and changes the part by that less the c discs it replaces:
-    a bump, a dimple or a blind hole by nothing. One that pierces the wall leaves x - 2c, and changes it by
-    that less 2c: a hole takes two.
+    shape: (n,) see `_wall_shapes`. Of a solid with the characteristic x the base's surface swallows or cuts
+    off regions with the sum r: its wall in the part has x - r, in the place of r, so that the part changes by
+    x - 2r. A bump, a dimple or a blind hole (x = 2, r = 1) changes nothing, a hole through the wall, with a
+    region on either side, takes two.
     """
     feature, cut = plan.feature, plan.fault == Fault.NONE
-    euler, shells = (2, 1) if plan.stamp is None else (plan.stamp.euler, plan.stamp.shells)
-    pierced = cut & (shape == euler - 2 * shells) & (not feature.adds)
-    blind = cut & (shape == euler - shells)
+    euler, region = (2, 1) if plan.stamp is None else (plan.stamp.euler, plan.stamp.cap_euler)
+    blind = cut & (shape == euler - region)
+    # where a mesh comes out of the wall again, its regions may be of any kind
+    pierced = cut & ((shape == 0) if plan.stamp is None else (shape < euler - region)) & (not feature.adds)
     problems = [text for _, text in failures[:SAID]]
     if len(failures) > SAID:
         problems.append(f"{nouns(f'more {feature.kind}', len(failures) - SAID)} could not be added either.")
@@ -301,7 +321,7 @@ def _verdict(
             f"Not every {feature.kind} {state}: {len(torn):,} do not, "
             f"the first is {_place(plan, int(torn[0]))}."
         )
-    change = int(blind.sum()) * (euler - 2 * shells) + int(pierced.sum()) * (euler - 4 * shells)
+    change = int((2 * shape[blind | pierced] - euler).sum())
     return problems, pierced, change
 
 
