@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import manifold3d
 import numpy as np
 
-from .closed import measure
+from .closed import edge_keys, measure
 from .cutters import Cutters, composed
 from .errors import RecipeError
 from .feature_recipe import Feature
