@@ -28,6 +28,7 @@ from ..core.recipe import Recipe
 from ..core.recipe_names import recipe_names, with_recipe_images
 from .applying import place_part, verdict_of
 from .attributes import CORNER_VERTEX, MATERIAL, write_values
+from .feature_objects import read_stamp as read_object_stamp
 from .generation import fill_settings, measured, put, read_source
 from .marked_side import on_marked_side
 from .part_mesh import build_part_mesh
@@ -122,6 +123,11 @@ def base_object() -> bpy.types.Object:
         raise BaseError("The .blend has no visible mesh object: show the part that is the base, and save")
     names = ", ".join(f'"{obj.name}"' for obj in meshes[:5])
     raise BaseError(f"The .blend has {len(meshes)} mesh objects ({names}): make the base active, and save")
+
+
+def read_stamp(name: str) -> Mesh:
+    """The object of the open file with that name, as a feature."""
+    return read_object_stamp(name, bpy.context)
 
 
 # -- out -----------------------------------------------------------------------------------------------------
