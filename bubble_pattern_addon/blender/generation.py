@@ -15,7 +15,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import PatternError
-from ..core.field_tables import Wanted, wanted
+from ..core.field_tables import Wanted
 from ..core.mesh import Bools
 from ..core.pattern import Pattern
 from ..core.pipeline import pattern_steps
@@ -23,6 +23,7 @@ from ..core.progress import Progress, Steps, drive
 from ..core.quality import Quality, measure, min_margin, min_web, open_area
 from ..core.recipe import Recipe, RegionChoice, default_recipe
 from ..core.recipe_file import recipe_from_dict
+from ..core.recipe_names import both, packing_names, shaping_names
 from ..core.region import Region, make_region
 from ..core.selection import select, sub_regions
 from ..core.shaping import reshaped
@@ -33,7 +34,7 @@ from .preview_nodes import show_preview
 from .properties import SETTINGS_VERSION, in_scene, pattern_objects
 from .reading import Base, evaluated_mesh, read_base, shown
 from .settings_recipe import packing_text, recipe_of, recipe_text, spoken, take_recipe
-from .surroundings import both, read_painted, trace, with_things
+from .surroundings import read_painted, trace, with_things
 
 # A pattern that took longer than this is not laid anew at every change of a setting.
 LIVE_SECONDS = 1.0
@@ -94,8 +95,8 @@ def read_source(
 
 
 def names_of(recipe: Recipe) -> tuple[Wanted, Wanted]:
-    """What the packing metric asks its surroundings for, and what the shaping metric does."""
-    return wanted(recipe.packing.pitch), wanted(recipe.shaping.diameter)
+    """What the packing metric asks its surroundings for, and what shaping the features does."""
+    return packing_names(recipe), shaping_names(recipe)
 
 
 def fitting_recipe(

@@ -227,6 +227,7 @@ class BUBBLE_PATTERN_OT_remove(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         from . import generation
+        from .feature_shapes import drop_unused
 
         obj = current_pattern(context)
         settings = obj.bubble_pattern
@@ -235,6 +236,7 @@ class BUBBLE_PATTERN_OT_remove(bpy.types.Operator):
         if in_scene(base) and not keep:
             generation.show_part(obj, context, False)
         remove_object(obj)
+        drop_unused()
         if part is not None and not keep:
             remove_object(part)
         if not in_scene(base):

@@ -18,7 +18,7 @@ from .result_properties import ResultSettings
 from .shaping_properties import BubblePatternSeed, ShapingSettings
 
 # Raised when a property changes its meaning; see upgrade.
-SETTINGS_VERSION = 2
+SETTINGS_VERSION = 3
 
 
 def is_on(settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
