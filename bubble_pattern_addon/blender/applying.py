@@ -9,13 +9,14 @@ from ..core.pattern import joined
 from ..core.progress import Progress, Steps
 from ..core.sides import check_one_side
 from ..core.solid import Part, part_steps
-from .generation import read_source, show_part, update_steps
+from .generation import show_part, update_steps
 from .part_mesh import build_part_mesh
 from .pattern_object import read_pattern
 from .properties import in_scene, pattern_objects
 from .provenance import Original, read_original
 from .reading import Base, evaluated_mesh, read_base, shown
 from .settings_recipe import is_outdated, recipe_of
+from .sources import read_source
 
 
 def apply_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[tuple[bpy.types.Object, Part]]:

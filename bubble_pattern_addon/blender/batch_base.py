@@ -27,7 +27,7 @@ from ..core.quality import measure
 from ..core.recipe import Recipe
 from .applying import place_part, verdict_of
 from .attributes import CORNER_VERTEX, MATERIAL, write_values
-from .generation import fill_settings, measured, put, read_source
+from .generation import fill_settings, measured, put
 from .marked_side import on_marked_side
 from .part_mesh import build_part_mesh
 from .pattern_object import new_pattern_object
@@ -39,6 +39,7 @@ from .provenance import Original, read_original
 from .reading import Base, evaluated_mesh, transformed, world_frame
 from .reading import read_base as read_object
 from .settings_recipe import recipe_of
+from .sources import read_source
 from .surroundings import read_painted, with_things
 from .target_region import ATTRIBUTE, store, stored
 

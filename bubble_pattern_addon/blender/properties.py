@@ -60,7 +60,7 @@ class BubblePatternSettings(
     )
     live: BoolProperty(
         name="Live Update",
-        description="Lay the pattern anew with every change, as long as that takes less than half a second",
+        description="Lay the pattern anew with every change of a setting",
         default=True,
     )
     show_bubbles: BoolProperty(

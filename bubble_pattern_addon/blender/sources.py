@@ -22,7 +22,7 @@ from ..core.surroundings import Surroundings
 from .marked_side import on_marked_side
 from .reading import Base, evaluated_mesh, read_base, shown
 from .surroundings import both, images_of, read_painted, trace, with_things
-from .watching import Stamp, stamp_of
+from .watching import Stamp, forgetters, stamp_of
 
 # So many readings are kept: those of the patterns on one part.
 KEPT = 3
@@ -55,9 +55,7 @@ class Reading(NamedTuple):
 _remembered: OrderedDict[Any, tuple[Stamp, Reading]] = OrderedDict()
 
 
-def forget_readings() -> None:
-    """Free what is remembered."""
-    _remembered.clear()
+forgetters.append(_remembered.clear)
 
 
 def read_source(

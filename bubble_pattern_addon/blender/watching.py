@@ -39,6 +39,8 @@ class Watch:
 _watch = Watch()
 # Called after every change of an object that is watched.
 listeners: list[Callable[[], None]] = []
+# Called when all that was learnt of objects is of no use any more: what keeps some of it frees it.
+forgetters: list[Callable[[], None]] = []
 
 
 def stamp_of(obj: bpy.types.Object) -> Stamp | None:
@@ -88,6 +90,8 @@ def noted(_scene: Any, depsgraph: bpy.types.Depsgraph) -> None:
 def another_state(*_: Any) -> None:
     """Undo, redo: whatever was known may be otherwise."""
     _watch.forget()
+    for forget in forgetters:
+        forget()
     for listener in listeners:
         listener()
 
@@ -99,6 +103,8 @@ def another_file(*_: Any) -> None:
     _watch.watched.clear()
     _watch.unseen.clear()
     _watch.changes.clear()
+    for forget in forgetters:
+        forget()
 
 
 HANDLERS = (

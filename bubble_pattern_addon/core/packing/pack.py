@@ -14,7 +14,7 @@ from ..progress import Progress, Steps, within
 from ..quality import measure_points
 from ..recipe import Packing
 from ..region import Region
-from ..surface import Charts, Complex, Spots, make_charts, positions, to_frame, walk
+from ..surface import Charts, Complex, Spots, positions, to_frame, walk
 from ..symmetry import find_symmetry
 from .bubbles import Bubbles, Ground, can_move, joined
 from .crowding import close_pairs, uncrowded
@@ -60,7 +60,7 @@ STIFF_STEPS = 45
 def pack_steps(region: Region, packing: Packing) -> Steps[tuple[Ground, Bubbles]]:
     """Bubbles packed tightly in `region`. Raises RegionError where the pitch does not suit the region."""
     yield Progress("Reading the region", 0.0)
-    charts = make_charts(region)
+    charts = region.charts
     pitch = _pitch_over(region, packing.pitch)
     _check_count(region, pitch)
     uniform = packing.pitch.value if isinstance(packing.pitch, Constant) else None
