@@ -6,7 +6,6 @@ writes.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -144,9 +143,8 @@ def write_blend(path: Path, run: Run) -> None:
         fill_settings(pattern_obj, base_obj, region, moved_recipe(with_images_in(run), to_frame, run.region))
         recipe = recipe_of(pattern_obj.bubble_pattern)
         source = read_source(base_obj, region, bpy.context, recipe)
-        start = time.perf_counter()
         own = moved(run.pattern, to_frame)
-        laid = measured(own, source.region, measure(own, source.region), start)
+        laid = measured(own, source.region, measure(own, source.region))
         laid = replace(laid, seconds=run.report["seconds"]["pack"])
         put(pattern_obj, source, recipe, laid)
         mesh = build_part_mesh(f"{base_obj.name} Part", run.part, run.pattern.places, base, original)

@@ -8,7 +8,7 @@ so a cancelled or failed run leaves nothing behind.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import bpy
@@ -17,7 +17,7 @@ import numpy as np
 from ..core.errors import PatternError
 from ..core.pattern import Pattern
 from ..core.pipeline import pattern_steps
-from ..core.progress import Progress, Steps, drive
+from ..core.progress import Progress, Result, Steps, drive
 from ..core.quality import Quality, measure, min_margin, min_web, open_area
 from ..core.recipe import Recipe, RegionChoice, default_recipe
 from ..core.recipe_file import recipe_from_dict
@@ -43,7 +43,7 @@ class Laid:
     web: float
     margin: float
     open_area: float
-    seconds: float
+    seconds: float = 0.0
 
 
 def fitting_recipe(
@@ -65,16 +65,29 @@ def fitting_recipe(
 
 def laying_steps(source: Source, recipe: Recipe) -> Steps[Laid]:
     """Steps 1 and 2 and their figures."""
-    start = time.perf_counter()
-    pattern = yield from pattern_steps(source.region, recipe, source.surroundings)
+    packing = pattern_steps(source.region, recipe, source.surroundings)
+    pattern, seconds = yield from timed(packing)
     yield Progress("Measuring", 1.0)
-    return measured(pattern, source.region, measure(pattern, source.region), start)
+    laid = measured(pattern, source.region, measure(pattern, source.region))
+    return replace(laid, seconds=seconds)
 
 
-def measured(pattern: Pattern, region: Region, quality: Quality, start: float) -> Laid:
-    """`pattern` with its figures; `start` is when work on it began."""
-    web, margin, share = min_web(pattern), min_margin(pattern, region), open_area(pattern, region)
-    return Laid(pattern, quality, web, margin, share, time.perf_counter() - start)
+def timed(steps: Steps[Result]) -> Steps[tuple[Result, float]]:
+    """Pass `steps` on; returns their result, and the seconds that they took without the pauses between."""
+    seconds = 0.0
+    while True:
+        start = time.perf_counter()
+        try:
+            progress = next(steps)
+        except StopIteration as end:
+            return end.value, seconds + time.perf_counter() - start
+        seconds += time.perf_counter() - start
+        yield progress
+
+
+def measured(pattern: Pattern, region: Region, quality: Quality) -> Laid:
+    """`pattern` with its figures."""
+    return Laid(pattern, quality, min_web(pattern), min_margin(pattern, region), open_area(pattern, region))
 
 
 def put(obj: bpy.types.Object, source: Source, recipe: Recipe, laid: Laid) -> None:
@@ -156,14 +169,13 @@ def reshape(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     """Give the features the sizes that the settings want, on the bubbles that are there."""
     settings = obj.bubble_pattern
     recipe = recipe_of(settings)
-    start = time.perf_counter()
     source = read_source(settings.base, settings.region, context, recipe)
     if source.fingerprint != settings.fingerprint:
         drive(update_steps(obj, context))
         return
     pattern = reshaped(read_pattern(obj, source.base.mesh), source.region, recipe, source.surroundings)
     quality = Quality(settings.six, 0.0, 0.0, settings.gap_min, 0.0)
-    laid = measured(pattern, source.region, quality, start)
+    laid = measured(pattern, source.region, quality)
     write_sizes(obj, pattern)
     note(settings, source, recipe, laid)
 
