@@ -8,8 +8,9 @@ from ..core.errors import PatternError, RegionError
 from ..core.pattern import joined
 from ..core.progress import Progress, Steps
 from ..core.sides import check_one_side
-from ..core.solid import Part, part_steps
+from ..core.solid import Part, Plan, cutting_seconds, part_steps
 from .generation import show_part, update_steps
+from .live import has_window
 from .part_mesh import build_part_mesh
 from .pattern_object import read_pattern
 from .properties import in_scene, pattern_objects
@@ -17,6 +18,7 @@ from .provenance import Original, read_original
 from .reading import Base, evaluated_mesh, read_base, shown
 from .settings_recipe import is_outdated, recipe_of
 from .sources import read_source
+from .stepping import PATIENCE
 
 
 def apply_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[tuple[bpy.types.Object, Part]]:
@@ -46,12 +48,17 @@ def apply_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[tupl
     pattern = joined([read_pattern(owner, base.mesh) for owner in owners])
     if not len(pattern):
         raise RegionError("The pattern has no features: make the pitch smaller or the region larger")
-    part = yield from part_steps(base.mesh, pattern, feature)
+    part = yield from part_steps(base.mesh, pattern, feature, is_long if has_window() else None)
     yield Progress("Building the part", 1.0)
     mesh = build_part_mesh(
         f"{base_object.name} Part", part, pattern.places, base, original, obj.bubble_pattern.wall_material
     )
     return place_part(base_object, owners, mesh, verdict_of(part), context), part
+
+
+def is_long(plan: Plan) -> bool:
+    """Whether a designer would take Blender for dead while this is cut."""
+    return cutting_seconds(plan) > PATIENCE
 
 
 def read_whole(obj: bpy.types.Object, context: bpy.types.Context) -> tuple[Base, Original]:
