@@ -29,7 +29,7 @@ def apply_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[tupl
     Raises PatternError, BaseError where the base is not fit for a solid.
     """
     base_object = obj.bubble_pattern.base
-    owners = pattern_objects(base_object)
+    owners = applied_with(obj)
     feature = recipe_of(obj.bubble_pattern).feature
     if any(recipe_of(owner.bubble_pattern).feature != feature for owner in owners):
         raise PatternError(
@@ -54,6 +54,19 @@ def apply_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[tupl
         f"{base_object.name} Part", part, pattern.places, base, original, obj.bubble_pattern.wall_material
     )
     return place_part(base_object, owners, mesh, verdict_of(part), context), part
+
+
+def applied_with(obj: bpy.types.Object) -> list[bpy.types.Object]:
+    """The patterns that are applied when `obj` is: one for each region of its base, in the order of names.
+
+    A duplicate of a pattern is a variant, in the same region: `obj` stands for its own, the first that is
+    shown for another.
+    """
+    on_base = pattern_objects(obj.bubble_pattern.base)
+    chosen: dict[str, bpy.types.Object] = {}
+    for other in sorted(on_base, key=lambda other: (other != obj, other.hide_get(), other.name)):
+        chosen.setdefault(other.bubble_pattern.region, other)
+    return sorted(chosen.values(), key=lambda other: other.name)
 
 
 def is_long(plan: Plan) -> bool:

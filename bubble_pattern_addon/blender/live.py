@@ -20,6 +20,7 @@ import bpy
 from ..core.errors import PatternError
 from ..core.progress import Steps
 from . import runs, watching
+from .cut_preview import cut_modifiers
 from .properties import in_scene, is_pattern, pattern_of
 from .settings_recipe import is_outdated, recipe_of, spoken
 
@@ -159,13 +160,19 @@ def look() -> None:
         base = obj.bubble_pattern.base
         if base.session_uid not in numbers:
             continue
-        if 'EDIT' in base.mode or not base.visible_get() or runs.under_way() is not None:
+        if not can_be_looked_at(base):
             later.add(base.session_uid)
             continue
         judge(obj, context)
         if has_window() and obj.bubble_pattern.live and is_behind(obj):
             lay_soon(obj)
     watching.put_back(later)
+
+
+def can_be_looked_at(base: bpy.types.Object) -> bool:
+    """Whether the base is as it will stay, and reading it disturbs nobody: no preview is switched off."""
+    at_rest = 'EDIT' not in base.mode and base.visible_get() and runs.under_way() is None
+    return at_rest and not cut_modifiers(base)
 
 
 def is_behind(obj: bpy.types.Object) -> bool:

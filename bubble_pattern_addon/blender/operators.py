@@ -12,6 +12,7 @@ import bpy
 from bpy.props import BoolProperty, FloatProperty
 
 from ..core.progress import Progress, Steps
+from .cut_preview import hide_cut
 from .field_properties import length_property, typed
 from .properties import in_scene, is_pattern, pattern_objects, pattern_of
 from .settings_recipe import recipe_of
@@ -243,6 +244,8 @@ class BUBBLE_PATTERN_OT_remove(bpy.types.Operator):
         settings = obj.bubble_pattern
         base, part, region = settings.base, settings.part, settings.region
         keep = self.keep_part and in_scene(part)
+        if base is not None:
+            hide_cut(base)
         if in_scene(base) and not keep:
             generation.show_part(obj, context, False)
         remove_object(obj)

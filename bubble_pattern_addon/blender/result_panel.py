@@ -14,7 +14,7 @@ class BUBBLE_PATTERN_PT_preview(SettingsPanel, bpy.types.Panel):
     bl_label = "Preview"
     bl_order = 7
     bl_options = {'DEFAULT_CLOSED'}
-    fields = ("live", "show_bubbles")
+    fields = ("live", "show_bubbles", "cut_preview")
 
 
 class BUBBLE_PATTERN_PT_result(SettingsPanel, bpy.types.Panel):

@@ -19,6 +19,7 @@ from ..core.recipe import Recipe, RegionChoice
 from ..core.region import Region, make_region
 from ..core.selection import select, sub_regions
 from ..core.surroundings import Surroundings
+from .cut_preview import hide_cut
 from .marked_side import on_marked_side
 from .reading import Base, evaluated_mesh, read_base, shown
 from .surroundings import both, images_of, read_painted, trace, with_things
@@ -93,6 +94,7 @@ def reading_of(
     """What `read` gives, as remembered where the base has not changed."""
     if obj.name not in context.view_layer.objects:
         raise BaseError(f'"{obj.name}" is not in this view layer: include its collection')
+    hide_cut(obj)
     context.evaluated_depsgraph_get()  # so that every change so far is in the stamp
     on_base = Wanted(names.attributes, names.materials, names.uv_maps)
     materials = tuple(slot.material.name if slot.material else "" for slot in obj.material_slots)
