@@ -102,7 +102,7 @@ def read_pattern(obj: bpy.types.Object, mesh: Mesh) -> Pattern:
     triangle = values("triangle", "value", np.int32).astype(np.int64)
     barycentric = values("barycentric", "vector", np.float32, 3).astype(np.float64)
     barycentric /= barycentric.sum(axis=1, keepdims=True)
-    position = (mesh.corners[triangle] * barycentric[:, :, None]).sum(axis=1)
+    position = (mesh.vertices[mesh.triangles[triangle]] * barycentric[:, :, None]).sum(axis=1)
     known = "wished" in points  # files of 0.1 have none
     bubbles = Pattern(
         places=Places(position, triangle, barycentric),
