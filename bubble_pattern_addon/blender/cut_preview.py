@@ -20,6 +20,8 @@ from .properties import is_pattern
 from .settings_recipe import is_outdated, recipe_of, spoken
 
 MODIFIER = "Bubble Pattern Cut"
+# The quickest first; the second one's name is that up to Blender 4.5 or that from 5.0 on.
+SOLVERS = ('MANIFOLD', 'FLOAT', 'FAST')
 
 
 def cut_modifiers(base: bpy.types.Object) -> list[bpy.types.Modifier]:
@@ -32,6 +34,7 @@ def toggle_cut(settings: Any, context: bpy.types.Context) -> None:
     obj = settings.id_data
     if not is_pattern(obj) or not obj.is_editable:
         return
+    settings.cut_trouble = ""
     is_shown = any(m.object is not None and m.object.parent == obj for m in cut_modifiers(settings.base))
     if is_shown == settings.cut_preview:
         return
@@ -42,8 +45,8 @@ def toggle_cut(settings: Any, context: bpy.types.Context) -> None:
         show_cut(obj, context)
     except PatternError as error:
         hide_cut(settings.base)
-        settings.cut_preview = False
-        settings.trouble = spoken(error, context)
+        settings.cut_preview = False  # which wipes the message away: it comes last
+        settings.cut_trouble = spoken(error, context)
 
 
 def show_cut(obj: bpy.types.Object, context: bpy.types.Context) -> None:
@@ -70,12 +73,17 @@ def show_cut(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     cutters = cutters_object(obj, plan.cutters.mesh)
     modifier = base.modifiers.new(MODIFIER, 'BOOLEAN')
     modifier.operation = 'DIFFERENCE'
-    modifier.solver = 'MANIFOLD'
     modifier.object = cutters
     modifier.show_expanded = False
     show_discs(obj, False)
-    # on what is open the modifier leaves the mesh as it is, and says so nowhere but in its log
-    if face_count(base, context) == before:
+    # On what is open the quick solver leaves the mesh as it is, and says so nowhere but in its log; some
+    # builds of Blender do not have it at all.
+    known = modifier.bl_rna.properties["solver"].enum_items.keys()
+    for solver in (name for name in SOLVERS if name in known):
+        modifier.solver = solver
+        if face_count(base, context) != before:
+            break
+    else:
         raise BaseError(
             f'Blender\'s Boolean modifier cannot cut "{base.name}", which is open or crosses itself: the cut '
             "cannot be shown; Apply may still make it"

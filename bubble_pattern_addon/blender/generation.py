@@ -107,7 +107,7 @@ def note(settings: Any, source: Source, recipe: Recipe, laid: Laid) -> None:
     settings.fingerprint = source.fingerprint
     settings.size_trace = source.size_trace
     settings.version = SETTINGS_VERSION
-    settings.trouble = ""
+    settings.trouble = settings.cut_trouble = ""
     live.note_base(settings.id_data)
     settings.count = len(laid.pattern)
     settings.shrunk = len(laid.pattern.shrunk)

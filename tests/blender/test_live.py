@@ -585,6 +585,23 @@ def test_cut_preview_undone(pattern: bpy.types.Object) -> None:
     assert sorted(obj.name for obj in bpy.data.objects) == ["Plate", "Plate Pattern"]
 
 
+def test_a_modifier_that_does_not_cut_is_told(pattern: bpy.types.Object, monkeypatch) -> None:
+    """As with open input, or in a build of Blender without the solver."""
+    from bubble_pattern_addon.blender import cut_preview
+
+    monkeypatch.setattr(cut_preview, "SOLVERS", ())
+    settings = pattern.bubble_pattern
+    settings.cut_preview = True
+    assert "cannot cut" in settings.cut_trouble
+    assert not settings.cut_preview
+    assert not settings.base.modifiers
+    assert pattern.modifiers["Bubble Pattern"].show_viewport
+    assert len(bpy.data.objects) == 2
+    monkeypatch.undo()
+    settings.cut_preview = True
+    assert (settings.cut_preview, settings.cut_trouble) == (True, "")
+
+
 def test_cut_preview_of_an_open_base_says_why(pattern: bpy.types.Object) -> None:
     settings = pattern.bubble_pattern
     base = settings.base
@@ -595,9 +612,11 @@ def test_cut_preview_of_an_open_base_says_why(pattern: bpy.types.Object) -> None
     bpy.ops.mesh.delete(type='FACE')
     bpy.ops.object.mode_set(mode='OBJECT')
     settings.cut_preview = True
-    assert "press Update" in settings.trouble
+    assert "press Update" in settings.cut_trouble
     bpy.ops.bubble_pattern.update()
+    assert settings.cut_trouble == ""
     settings.cut_preview = True
-    assert "not a closed solid" in settings.trouble
+    assert "not a closed solid" in settings.cut_trouble
+    assert settings.trouble == ""
     assert not settings.cut_preview
     assert not base.modifiers
