@@ -15,7 +15,6 @@ from ..core.errors import BaseError, PatternError, RegionError
 from ..core.mesh import Mesh
 from ..core.progress import drive
 from .attributes import CORNER_VERTEX, write_values
-from .preview_nodes import MODIFIER as DISCS
 from .properties import is_pattern
 from .settings_recipe import is_outdated, recipe_of, spoken
 
@@ -75,7 +74,7 @@ def show_cut(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     modifier.operation = 'DIFFERENCE'
     modifier.object = cutters
     modifier.show_expanded = False
-    show_discs(obj, False)
+    obj.hide_set(True)  # its discs would fill the holes
     # On what is open the quick solver leaves the mesh as it is, and says so nowhere but in its log; some
     # builds of Blender do not have it at all.
     known = modifier.bl_rna.properties["solver"].enum_items.keys()
@@ -106,6 +105,7 @@ def cutters_object(obj: bpy.types.Object, mesh: Mesh) -> bpy.types.Object:
     write_values(data, CORNER_VERTEX, 'CORNER', 'INT', mesh.triangles.ravel())
     data.polygons.foreach_set("loop_start", np.arange(0, 3 * count, 3, dtype=np.int32))
     data.update(calc_edges=True)
+    data.shade_flat()  # or the smooth base would be shaded round the rims
     cutters = bpy.data.objects.new(data.name, data)
     for collection in obj.users_collection:
         collection.objects.link(cutters)
@@ -133,11 +133,4 @@ def hide_cut(base: bpy.types.Object) -> None:
     # the settings last: what their change sets off finds nothing more to hide
     for obj in shown:
         obj.bubble_pattern.cut_preview = False
-        show_discs(obj, True)
-
-
-def show_discs(obj: bpy.types.Object, shown: bool) -> None:
-    """Show the features as discs, or not: they would fill the holes."""
-    modifier = obj.modifiers.get(DISCS)
-    if modifier is not None:
-        modifier.show_viewport = shown
+        obj.hide_set(False)

@@ -125,9 +125,11 @@ class SteppedOperator:
                 self.tidy(context)
                 return outcome
             self.show(context)
-        if event.type in NAVIGATION or (self.heeds_sidebar and is_over_sidebar(context, event)):
+        # A button let go is no edit, and the slider that is being dragged waits for it.
+        if event.type in NAVIGATION or event.value == 'RELEASE':
             return {'PASS_THROUGH'}
-        return {'RUNNING_MODAL'}
+        over_sidebar = self.heeds_sidebar and is_over_sidebar(context, event)
+        return {'PASS_THROUGH'} if over_sidebar else {'RUNNING_MODAL'}
 
     def give_up(self, context: bpy.types.Context, why: str) -> set[str]:
         """End without a result."""
