@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from . import command, fixed_sizes, operators, panels, properties, versioning
+from . import command, fixed_sizes, live, operators, panels, properties, runs, versioning, watching
 
-MODULES = (properties, operators, fixed_sizes, panels, versioning, command)
+MODULES = (properties, watching, runs, live, operators, fixed_sizes, panels, versioning, command)
 
 
 def register() -> None:
