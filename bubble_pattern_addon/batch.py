@@ -28,7 +28,8 @@ from .core.mesh import Bools, Floats
 from .core.pattern import Pattern
 from .core.pipeline import pattern_steps
 from .core.progress import Progress, Steps, drive, within
-from .core.recipe import Recipe, default_recipe, load_recipe, recipe_to_toml
+from .core.recipe import Recipe, default_recipe
+from .core.recipe_file import load_recipe, recipe_to_toml
 from .core.region import Region, make_region
 from .core.selection import select, sub_regions
 from .core.sides import check_one_side

@@ -131,7 +131,7 @@ def make(name: str, folder: Path, size: tuple[int, int], show: Callable[[Progres
     from bubble_pattern_addon.core.field_tables import wanted
     from bubble_pattern_addon.core.files import output_folder
     from bubble_pattern_addon.core.progress import Progress, drive, within
-    from bubble_pattern_addon.core.recipe import load_recipe
+    from bubble_pattern_addon.core.recipe_file import load_recipe
     from scripts.progress_bar import follow_rendering
 
     show(Progress("Modelling", 0.0))

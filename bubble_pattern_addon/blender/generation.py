@@ -21,7 +21,8 @@ from ..core.pattern import Pattern
 from ..core.pipeline import pattern_steps
 from ..core.progress import Progress, Steps, drive
 from ..core.quality import Quality, measure, min_margin, min_web, open_area
-from ..core.recipe import Recipe, RegionChoice, default_recipe, recipe_from_dict
+from ..core.recipe import Recipe, RegionChoice, default_recipe
+from ..core.recipe_file import recipe_from_dict
 from ..core.region import Region, make_region
 from ..core.selection import select, sub_regions
 from ..core.shaping import reshaped

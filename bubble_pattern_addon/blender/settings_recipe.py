@@ -11,17 +11,9 @@ import bpy
 from ..core.blending import Fill
 from ..core.errors import PatternError, RecipeError
 from ..core.metric import Constant, Described
-from ..core.recipe import (
-    Feature,
-    Limits,
-    Packing,
-    Recipe,
-    RegionChoice,
-    Seed,
-    Shaping,
-    check_recipe,
-    recipe_to_toml,
-)
+from ..core.recipe import Feature, Limits, Packing, Recipe, RegionChoice, Seed, Shaping
+from ..core.recipe_checks import check_recipe
+from ..core.recipe_file import recipe_to_toml
 from .field_properties import point_of, typed
 from .field_recipe import described, take
 from .properties import BubblePatternSettings

@@ -8,7 +8,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..core.errors import PatternError
-from ..core.recipe import recipe_from_dict
+from ..core.recipe_file import recipe_from_dict
 from .preview_nodes import VERSION, VERSION_KEY, show_preview
 from .properties import SETTINGS_VERSION, is_pattern
 from .settings_recipe import recipe_of, recipe_text

@@ -12,7 +12,8 @@ from scipy.sparse.csgraph import connected_components
 
 from .errors import RegionError
 from .mesh import Bools, Floats, Ints, Mesh
-from .recipe import RegionChoice, check_choice
+from .recipe import RegionChoice
+from .recipe_checks import check_choice
 from .region import weld
 
 NO_NAMES: Mapping[str, Bools] = {}

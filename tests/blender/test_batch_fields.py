@@ -16,7 +16,7 @@ from bubble_pattern_addon import batch
 from bubble_pattern_addon.blender import settings_recipe
 from bubble_pattern_addon.blender.pixels import read_image
 from bubble_pattern_addon.core.errors import FieldError
-from bubble_pattern_addon.core.recipe import load_recipe
+from bubble_pattern_addon.core.recipe_file import load_recipe
 
 from .parts import plate, points
 

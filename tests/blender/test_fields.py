@@ -19,9 +19,11 @@ from bubble_pattern_addon.blender import (  # noqa: E402
     field_panels,
     field_properties,
     generation,
+    packing_panel,
     panels,
     properties,
     settings_recipe,
+    shaping_panel,
 )
 from bubble_pattern_addon.core.blending import Fill, Most  # noqa: E402
 from bubble_pattern_addon.core.field_tables import field_from_toml  # noqa: E402
@@ -701,7 +703,7 @@ def test_the_sidebar_shows_what_a_kind_needs() -> None:
         field_panels.draw_field(Layout(drawn), settings, "fill", "diameter_field", True, "Diameter")
         assert {shown, "start_share", "axis"} <= set(drawn)
     field.kind = 'CONSTANT'
-    for cls in (panels.BUBBLE_PATTERN_PT_packing, panels.BUBBLE_PATTERN_PT_holes):
+    for cls in (packing_panel.BUBBLE_PATTERN_PT_packing, shaping_panel.BUBBLE_PATTERN_PT_shaping):
         drawn = []
         cls.draw(SimpleNamespace(layout=Layout(drawn), fields=()), bpy.context)
         assert drawn

@@ -16,7 +16,7 @@ from bubble_pattern_addon import batch
 from bubble_pattern_addon.core import files
 from bubble_pattern_addon.core.export import COLUMNS
 from bubble_pattern_addon.core.progress import Progress
-from bubble_pattern_addon.core.recipe import load_recipe
+from bubble_pattern_addon.core.recipe_file import load_recipe
 from scripts import pattern_batch
 
 ROOT = Path(__file__).resolve().parents[2]

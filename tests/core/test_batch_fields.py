@@ -14,7 +14,7 @@ import trimesh
 from bubble_pattern_addon import batch
 from bubble_pattern_addon.core.files import load_base
 from bubble_pattern_addon.core.paint import COLOUR, UV_MAP
-from bubble_pattern_addon.core.recipe import load_recipe
+from bubble_pattern_addon.core.recipe_file import load_recipe
 from scripts.pattern_batch import _asks_for_blender
 
 TOP = "[region]\nnear = [0, 0, 2]\n"

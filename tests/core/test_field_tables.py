@@ -25,16 +25,9 @@ from bubble_pattern_addon.core.field_tables import (
 from bubble_pattern_addon.core.fields import Distance, Edge, Linear, Radial
 from bubble_pattern_addon.core.metric import Constant, Described
 from bubble_pattern_addon.core.painted import CHANNELS, Attribute, Image
-from bubble_pattern_addon.core.recipe import (
-    Packing,
-    Recipe,
-    RegionChoice,
-    Seed,
-    Shaping,
-    check_recipe,
-    recipe_from_dict,
-    recipe_to_toml,
-)
+from bubble_pattern_addon.core.recipe import Packing, Recipe, RegionChoice, Seed, Shaping
+from bubble_pattern_addon.core.recipe_checks import check_recipe
+from bubble_pattern_addon.core.recipe_file import recipe_from_dict, recipe_to_toml
 
 ROOT = Path(__file__).resolve().parents[2]
 lengths = st.floats(1e-3, 1e3)

@@ -23,7 +23,8 @@ from bubble_pattern_addon.core.pattern import Pattern, all_bubbles
 from bubble_pattern_addon.core.pipeline import pattern_steps
 from bubble_pattern_addon.core.progress import drive
 from bubble_pattern_addon.core.quality import min_margin, min_web
-from bubble_pattern_addon.core.recipe import Limits, Packing, Recipe, Seed, Shaping, check_recipe
+from bubble_pattern_addon.core.recipe import Limits, Packing, Recipe, Seed, Shaping
+from bubble_pattern_addon.core.recipe_checks import check_recipe
 from bubble_pattern_addon.core.region import Region, make_region
 from bubble_pattern_addon.core.shaping import reshaped
 from bubble_pattern_addon.core.surroundings import NOTHING

@@ -18,13 +18,11 @@ from bubble_pattern_addon.core.recipe import (
     Recipe,
     RegionChoice,
     Shaping,
-    check_recipe,
     default_recipe,
-    load_recipe,
     neat,
-    recipe_from_dict,
-    recipe_to_toml,
 )
+from bubble_pattern_addon.core.recipe_checks import check_recipe
+from bubble_pattern_addon.core.recipe_file import load_recipe, recipe_from_dict, recipe_to_toml
 
 coordinates = st.floats(-1e6, 1e6)
 lengths = st.floats(1e-6, 1e6)

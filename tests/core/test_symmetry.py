@@ -25,15 +25,9 @@ from bubble_pattern_addon.core.pattern import joined as end_to_end
 from bubble_pattern_addon.core.pipeline import pattern_steps
 from bubble_pattern_addon.core.progress import drive
 from bubble_pattern_addon.core.quality import measure, neighbours
-from bubble_pattern_addon.core.recipe import (
-    Limits,
-    Packing,
-    Recipe,
-    Shaping,
-    check_recipe,
-    recipe_from_dict,
-    recipe_to_toml,
-)
+from bubble_pattern_addon.core.recipe import Limits, Packing, Recipe, Shaping
+from bubble_pattern_addon.core.recipe_checks import check_recipe
+from bubble_pattern_addon.core.recipe_file import recipe_from_dict, recipe_to_toml
 from bubble_pattern_addon.core.region import Region, make_region
 from scripts.shapes import SHAPES, Shape, circle, coarse_sheet, joined, panel_sheet, rectangle_outline
 

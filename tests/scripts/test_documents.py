@@ -8,7 +8,8 @@ from pathlib import Path
 
 from bubble_pattern_addon.core.field_tables import KINDS
 from bubble_pattern_addon.core.field_tables import READERS as FIELD_READERS
-from bubble_pattern_addon.core.recipe import READERS, Recipe, recipe_from_dict
+from bubble_pattern_addon.core.recipe import Recipe
+from bubble_pattern_addon.core.recipe_file import READERS, recipe_from_dict
 
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text("utf-8")

@@ -19,7 +19,8 @@ from bubble_pattern_addon.core.metric import Places
 from bubble_pattern_addon.core.pattern import Pattern
 from bubble_pattern_addon.core.pipeline import pattern_steps
 from bubble_pattern_addon.core.progress import drive
-from bubble_pattern_addon.core.recipe import Recipe, load_recipe
+from bubble_pattern_addon.core.recipe import Recipe
+from bubble_pattern_addon.core.recipe_file import load_recipe
 from bubble_pattern_addon.core.region import Region, make_region
 from bubble_pattern_addon.core.soundness import sound_base
 from scripts.gallery import NAMES, RECIPES, ROOT, parse

@@ -60,10 +60,14 @@ def find_pairs(charts: Charts, points: Floats, row: Ints, pitch: Floats, skin: f
 
     points: (n, 3) positions; row: (n,) region rows; pitch: (n,)
     """
-    at, reach = signature(charts.region, points, row, float(pitch.max())), REACH + skin
-    if pitch.max() < CLASS * pitch.min():
+    least, most = float(pitch.min(initial=np.inf)), float(pitch.max(initial=0.0))
+    at, reach = signature(charts.region, points, row, most), REACH + skin
+    if most < CLASS * least:
         tree = cKDTree(at, balanced_tree=False, compact_nodes=False)
-        first, second = tree.query_pairs(reach * float(pitch.max()), output_type="ndarray").T
+        first, second = tree.query_pairs(reach * most, output_type="ndarray").T
+        if most == least and charts.region.single_sheet:
+            # what the tree found is near enough
+            return Pairs(first, second, np.full(len(first), most))
     else:
         # Bubbles are searched for in classes of like size, so that small ones among large list no hundreds.
         size = np.floor(np.log(pitch / pitch.min()) / np.log(CLASS)).astype(np.int64)

@@ -104,11 +104,12 @@ def _walked_inward(charts: Charts, boundary: Boundary, radius: Lengths) -> tuple
     inward = 1j * (charts.corners[at, (opposite + 2) % 3] - charts.corners[at, (opposite + 1) % 3])
     size = radius(start)
     walked = walk(charts, start, inward / np.abs(inward) * (size + region.reserve[owner]))
-    distance, _ = _to_boundary(charts, boundary, walked.arrived)
-    kept = (walked.left == 0) & (distance >= size * (1 - 1e-3))
+    known = _to_boundary(charts, boundary, walked.arrived)
+    kept = (walked.left == 0) & (known[0] >= size * (1 - 1e-3))
     edges = [len(loop) for loop in region.loops]
     loop = np.repeat(np.arange(len(edges)), edges)[owner]
-    settled = _settled(charts, boundary, radius, walked.arrived.take(kept))
+    known = known[0][kept], known[1][kept]
+    settled = _settled(charts, boundary, radius, walked.arrived.take(kept), known)
     return settled, loop[kept], np.flatnonzero(kept), np.bincount(loop, minlength=len(edges))
 
 
@@ -135,10 +136,20 @@ def _to_boundary(charts: Charts, boundary: Boundary, spots: Spots) -> tuple[Floa
     return nearest_boundary(boundary, positions(charts, spots), spots.row)
 
 
-def _settled(charts: Charts, boundary: Boundary, radius: Lengths, spots: Spots, rounds: int = 3) -> Spots:
-    """The same places moved to where the distance to the boundary is the radius, by Newton's method."""
+def _settled(
+    charts: Charts,
+    boundary: Boundary,
+    radius: Lengths,
+    spots: Spots,
+    known: tuple[Floats, Floats] | None = None,
+    rounds: int = 3,
+) -> Spots:
+    """The same places moved to where the distance to the boundary is the radius, by Newton's method; what
+    `nearest_boundary` says of them may be `known`.
+    """
     for _ in range(rounds):
-        distance, foot = _to_boundary(charts, boundary, spots)
+        distance, foot = known or _to_boundary(charts, boundary, spots)
+        known = None
         lacking = radius(spots) - distance
         if np.abs(lacking).max(initial=0.0) < 1e-9 * distance.max(initial=1.0):
             break

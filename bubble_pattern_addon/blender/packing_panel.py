@@ -1,0 +1,50 @@
+"""The sub-panel of step 1."""
+
+from __future__ import annotations
+
+import bpy
+
+from .field_panels import draw_field
+from .sidebar import SettingsPanel, columns, shown_settings
+
+
+class BUBBLE_PATTERN_PT_packing(SettingsPanel, bpy.types.Panel):
+    """Step 1: where the features are."""
+
+    bl_label = "Packing"
+    bl_order = 2
+
+    def draw(self, context: bpy.types.Context) -> None:
+        settings = shown_settings(context)
+        column = columns(self.layout)
+        draw_field(column, settings, "pitch", "pitch_field", False, "Pitch")
+        column.prop(settings, "edge_offset")
+        column.prop(settings, "orientation")
+        if settings.orientation == 'GIVEN':
+            column.prop(settings, "rows_along", text=" ")
+        draw_symmetry(column, settings)
+        column.prop(settings, "seed")
+
+
+def draw_symmetry(column: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    """The symmetry, and what is known only of some."""
+    column.prop(settings, "symmetry")
+    if settings.symmetry == 'ROTATE':
+        column.prop(settings, "symmetry_fold")
+        column.prop(settings, "symmetry_axis")
+    if settings.symmetry != 'OFF':
+        column.prop(settings, "use_symmetry_centre")
+    if settings.symmetry != 'OFF' and settings.use_symmetry_centre:
+        column.prop(settings, "symmetry_centre", text=" ")
+
+
+class BUBBLE_PATTERN_PT_solver(SettingsPanel, bpy.types.Panel):
+    """How step 1 is solved."""
+
+    bl_label = "Solver"
+    bl_parent_id = "BUBBLE_PATTERN_PT_packing"
+    bl_options = {'DEFAULT_CLOSED'}
+    fields = ("integrator", "iterations", "tolerance")
+
+
+CLASSES = (BUBBLE_PATTERN_PT_packing, BUBBLE_PATTERN_PT_solver)

@@ -1,0 +1,30 @@
+# mypy: disable-error-code="valid-type"
+"""The settings of the target region."""
+
+from __future__ import annotations
+
+from bpy.props import StringProperty
+
+from .field_properties import length_property
+from .reacting import repack
+
+
+class RegionSettings:
+    """Which faces the pattern fills, as the recipe's [region]."""
+
+    region: StringProperty(
+        name="Region",
+        description="Face attribute of the base that marks the target region",
+    )
+    parts: StringProperty(
+        name="Sub-Regions",
+        description="Face attributes or materials, separated by commas, whose faces get their own first row",
+        update=repack,
+    )
+    gap: length_property(
+        name="Gap",
+        description="What stays free between neighboring sub-regions",
+        default=0.0,
+        min=0.0,
+        update=repack,
+    )
