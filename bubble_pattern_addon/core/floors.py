@@ -40,6 +40,19 @@ class Floors:
     unknown: int = 0
 
     @property
+    def notes(self) -> tuple[str, ...]:
+        """What a designer should know of them."""
+        if not self.unknown:
+            return ()
+        one = (
+            "the wall under one feature" if self.unknown == 1 else f"the wall under {self.unknown:,} features"
+        )
+        return (
+            f"No far side was found of {one}: the rules of the process hold there as far as they do "
+            "without a thickness. Give the thickness.",
+        )
+
+    @property
     def diameter(self) -> Floats:
         """Least diameter for whichever reason, (n,)."""
         return np.maximum(self.hole, self.slender)

@@ -17,11 +17,11 @@ from dataclasses import replace
 import numpy as np
 
 from .distance import boundary_distance
+from .floors import Floors, floors_of
 from .mesh import Bools, Floats, Ints
+from .nominal import SAME, next_above, snapped
 from .packing.crowding import uncrowded
 from .pattern import Pattern, split
-from .floors import Floors, floors_of
-from .nominal import SAME, next_above, snapped
 from .recipe import Limits
 from .region import Region
 from .webs import LEAST_WEB, ROUNDING, narrow_pairs

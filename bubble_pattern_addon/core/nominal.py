@@ -21,8 +21,48 @@ Sizes = tuple[float, ...] | str
 """Diameters in the unit of the base, or the name of a series."""
 
 _R10 = (1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0)
-_R20 = (1.0, 1.12, 1.25, 1.4, 1.6, 1.8, 2.0, 2.24, 2.5, 2.8, 3.15, 3.55, 4.0, 4.5, 5.0, 5.6, 6.3, 7.1, 8.0, 9.0)
-_TAP_DRILLS = (0.75, 0.85, 0.95, 1.1, 1.25, 1.45, 1.6, 1.75, 2.05, 2.5, 2.9, 3.3, 3.7, 4.2, 5.0, 6.0, 6.8, 7.8)
+_R20 = (
+    1.0,
+    1.12,
+    1.25,
+    1.4,
+    1.6,
+    1.8,
+    2.0,
+    2.24,
+    2.5,
+    2.8,
+    3.15,
+    3.55,
+    4.0,
+    4.5,
+    5.0,
+    5.6,
+    6.3,
+    7.1,
+    8.0,
+    9.0,
+)
+_TAP_DRILLS = (
+    0.75,
+    0.85,
+    0.95,
+    1.1,
+    1.25,
+    1.45,
+    1.6,
+    1.75,
+    2.05,
+    2.5,
+    2.9,
+    3.3,
+    3.7,
+    4.2,
+    5.0,
+    6.0,
+    6.8,
+    7.8,
+)
 _TAP_DRILLS += (8.5, 9.5, 10.2, 12.0, 14.0, 15.5, 17.5, 19.5, 21.0)
 
 
@@ -78,7 +118,8 @@ def sizes_from_toml(value: object, where: str) -> Sizes:
         return value
     if not isinstance(value, list) or not value:
         raise RecipeError(
-            f'{where} = {show(value)} must be a list of diameters, or the name of a series such as "drills 0.5"'
+            f"{where} = {show(value)} must be a list of diameters, or the name of a series such as "
+            '"drills 0.5"'
         )
     return tuple(number(size, where) for size in value)
 

@@ -23,6 +23,7 @@ import numpy as np
 
 from .mesh import Floats
 
+
 @dataclass(frozen=True)
 class Least:
     """A least length: so many `times` the thickness, and never below so many `millimetres`."""
