@@ -75,10 +75,8 @@ def floors_of(
     if limits.process is None:
         return Floors(hole, np.zeros(n), web, margin)
     process = PROCESSES[limits.process]
-    if limits.thickness is None:
-        thickness = near_thickness(bubbles, region)
-    else:
-        thickness = np.full(n, limits.thickness)
+    known = limits.thickness
+    thickness = near_thickness(bubbles, region) if known is None else np.full(n, known)
     deep = thickness / process.through if depth is None else np.full(n, depth / process.blind)
     return Floors(
         np.fmax(hole, process.hole.at(thickness, millimetre)),

@@ -43,7 +43,7 @@ _R20 = (
     8.0,
     9.0,
 )
-_TAP_DRILLS = (
+_TAP_DRILLS: tuple[float, ...] = (
     0.75,
     0.85,
     0.95,

@@ -12,7 +12,16 @@ from .metric import Constant, Described
 from .nominal import check_sizes
 from .processes import PROCESSES
 from .recipe import (
-    FORMATS, INTEGRATORS, KINDS, ORIENTATIONS, SOLVERS, Limits, Output, Recipe, RegionChoice, Shaping,
+    FORMATS,
+    INTEGRATORS,
+    KINDS,
+    ORIENTATIONS,
+    SOLVERS,
+    Limits,
+    Output,
+    Recipe,
+    RegionChoice,
+    Shaping,
 )
 from .toml_values import check_above, check_at_least, check_finite, check_one_of
 from .units import check_unit

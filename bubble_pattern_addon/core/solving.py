@@ -108,7 +108,7 @@ def _by_diameter(region: Region, recipe: Recipe, surroundings: Surroundings) -> 
         sized = replace(bubbles, diameter=wished * factor)
         return open_area(limited_by(sized, region, floors, sizes), region)
 
-    yield Progress("Finding the diameter", 0.8)
+    yield Progress("Shaping to the open area", 0.8)
     plain = float(np.pi / 4 * (wished**2).sum() / region.area)
     trials = yield from within(
         _smallest_factor(open_at, target, plain, _largest_factor(recipe, bubbles.pitch, wished)), 0.8, 0.95
@@ -117,9 +117,8 @@ def _by_diameter(region: Region, recipe: Recipe, surroundings: Surroundings) -> 
     slack = max(TOLERANCE * target, plain / len(bubbles) if sizes is None else 0.0)
     if reachable[1] < target - slack:
         raise RecipeError(
-            f"An open area of {target:.1%} can't be reached by the diameter: the pitch and the limits let it "
-            f"come to {reachable[1]:.1%} at most; make the limits or the edge offset smaller, or solve by the "
-            "pitch"
+            f"An open area of {target:.1%} can't be reached by the diameter: pitch and limits let it come to "
+            f"{reachable[1]:.1%} at most; make the limits or the edge offset smaller, or solve by the pitch"
         )
     factor = min(trials, key=lambda trial: (abs(trial[1] - target), trial[0]))[0]
     found = replace(recipe, shaping=scaled_sizes(recipe.shaping, factor))
@@ -156,7 +155,7 @@ def _smallest_factor(
     factor = min(np.sqrt(target / plain), largest)
     trials = [(factor, open_at(factor))]
     while trials[-1][1] < target * (1 - CLOSE) and factor < largest and len(trials) < TRIALS:
-        yield Progress("Finding the diameter", 0.5 * len(trials) / TRIALS)
+        yield Progress("Shaping to the open area", 0.5 * len(trials) / TRIALS)
         low = factor
         ahead = np.sqrt(target / max(trials[-1][1], 1e-9))
         factor = min(factor * float(np.clip(ahead, 1.01, 1.1)), largest)
@@ -165,7 +164,7 @@ def _smallest_factor(
         return trials
     high = factor
     while high - low > CLOSE * high and abs(trials[-1][1] / target - 1) > CLOSE and len(trials) < 2 * TRIALS:
-        yield Progress("Finding the diameter", 0.5 * len(trials) / TRIALS)
+        yield Progress("Shaping to the open area", 0.5 * len(trials) / TRIALS)
         factor = (low + high) / 2
         trials.append((factor, open_at(factor)))
         if trials[-1][1] < target:
@@ -320,7 +319,9 @@ def _next_factor(trials: list[_Trial], target: float) -> float:
     # counts jump here: the neighbourhood of what the nearest trials agree on, near to far
     nearest = sorted((trial for trial in trials if trial.value > 0), key=lambda t: abs(t.value - target))[:4]
     middle = float(np.median([trial.factor * np.sqrt(trial.value / target) for trial in nearest]))
-    steps = (side * number * tiny for number in range(2 * MOST_PACKINGS) for side in (1, -1))
+    steps = (
+        side * number * (number + 1) / 2 * tiny for number in range(2 * MOST_PACKINGS) for side in (1, -1)
+    )
     return next(middle * (1 + step) for step in steps if _untried(middle * (1 + step), trials, tiny))
 
 
