@@ -7,7 +7,7 @@ it, so that a hole on a rib obeys the rib.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -38,6 +38,16 @@ class Floors:
     web: Floats
     margin: Floats
     unknown: int = 0
+
+    def take(self, rows: Ints) -> Floors:
+        """Those of the features of these rows."""
+        return replace(
+            self,
+            hole=self.hole[rows],
+            slender=self.slender[rows],
+            web=self.web[rows],
+            margin=self.margin[rows],
+        )
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -17,11 +17,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .floors import Broken
+from .floors import Broken, broken_rules, floors_of
 from .mesh import Floats, Ints
-from .pattern import Pattern
+from .pattern import Pattern, all_bubbles
+from .processes import PROCESSES
 from .quality import Quality, min_margin, neighbours, open_area
+from .recipe import Recipe
 from .region import Region
+from .thickness import near_thickness
+from .units import millimetre
 
 WORDS = ("excellent", "good", "fair", "poor")
 UNKNOWN = "unknown"
@@ -69,17 +73,26 @@ class Results:
     broken: tuple[Broken, ...]
 
 
-def results_of(
-    pattern: Pattern,
-    region: Region,
-    broken: Sequence[Broken] = (),
-    removed: float = np.nan,
-    nominal: bool = False,
-) -> Results:
-    """Results of a pattern. broken: see floors.broken_rules; nominal: its diameters come from a list"""
+def results_of(pattern: Pattern, region: Region, recipe: Recipe, removed: float | None = None) -> Results:
+    """Results of a pattern that `recipe` made, or that shall keep its limits and its process.
+
+    removed: volume that is known exactly, from the part; None: it is estimated from the near wall
+    """
+    bubbles = all_bubbles(pattern)
+    kept = np.searchsorted(bubbles.ids, pattern.ids)
+    depth = recipe.feature.depth
+    floors = floors_of(bubbles, region, recipe.limits, depth, millimetre(recipe.output.unit)).take(kept)
+    if removed is None:
+        deep = near_thickness(bubbles, region)[kept] if depth is None else depth
+        removed = float((np.pi / 4 * pattern.diameter**2 * deep).sum())
+    process = recipe.limits.process
+    broken = broken_rules(
+        pattern, region, floors, least_draft=0.0 if process is None else PROCESSES[process].draft
+    )
     web, mean = webs(pattern)
     diameter = pattern.diameter
     some = len(pattern) > 0
+    nominal = recipe.shaping.sizes is not None
     sizes, count = np.unique(diameter, return_counts=True) if nominal else ((), ())
     return Results(
         count=len(pattern),
@@ -91,7 +104,7 @@ def results_of(
         open_area=open_area(pattern, region),
         removed=removed,
         sizes=tuple((float(size), int(number)) for size, number in zip(sizes, count, strict=True)),
-        broken=tuple(broken),
+        broken=broken,
     )
 
 
@@ -122,17 +135,12 @@ def web_between(pattern: Pattern, one: int, other: int) -> Web:
     return Web(distance - float(radius.sum()), ids, (one, other), between)
 
 
-def removed_estimate(pattern: Pattern, thickness: Floats, depth: float | None) -> float:
-    """Volume of round features through walls of that `thickness` (n,), or to a depth; nan where a wall's
-    thickness is not known.
+def mass(volume: float, density: float, mm: float) -> float:
+    """Grams of a volume in the unit of the base cubed.
+
+    density: in g/cm3; mm: length of a millimetre in the unit of the base
     """
-    deep = thickness if depth is None else np.full(len(pattern), depth)
-    return float((np.pi / 4 * pattern.diameter**2 * deep).sum())
-
-
-def mass(volume: float, density: float, millimetre: float) -> float:
-    """Grams of a volume in the unit of the base cubed. density: in g/cm3; millimetre: in the base's unit"""
-    return volume / millimetre**3 / 1000.0 * density
+    return volume / mm**3 / 1000.0 * density
 
 
 def words_of(quality: Quality) -> dict[str, str]:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from .floors import Broken, broken_rules, floors_of
+from .floors import Broken
 from .pattern import Pattern
-from .processes import PROCESSES
 from .quality import Quality
 from .recipe import Recipe
 from .region import Region
@@ -26,8 +25,7 @@ def results_report(
     nominal diameter; process; broken, one entry for each rule that features break (see floors.Broken); solve,
     what was asked for and found, None where nothing was
     """
-    broken = rules_broken(pattern, region, recipe)
-    results = results_of(pattern, region, broken, part.check.removed_volume, recipe.shaping.sizes is not None)
+    results = results_of(pattern, region, recipe, part.check.removed_volume)
     density = recipe.output.density
     return {
         "mean_web": results.mean_web,
@@ -39,19 +37,9 @@ def results_report(
         "in_words": words_of(quality),
         "nominal": [{"diameter": size, "features": count} for size, count in results.sizes],
         "process": recipe.limits.process,
-        "broken": [_broken(rule) for rule in broken],
+        "broken": [_broken(rule) for rule in results.broken],
         "solve": None if solved is None else _solved(solved),
     }
-
-
-def rules_broken(pattern: Pattern, region: Region, recipe: Recipe) -> tuple[Broken, ...]:
-    """What the pattern breaks of the recipe's limits and of its process."""
-    mm = millimetre(recipe.output.unit)
-    floors = floors_of(pattern, region, recipe.limits, recipe.feature.depth, mm)
-    process = recipe.limits.process
-    return broken_rules(
-        pattern, region, floors, least_draft=0.0 if process is None else PROCESSES[process].draft
-    )
 
 
 def _web(web: Web | None) -> dict[str, Any] | None:

@@ -9,8 +9,8 @@ from .falloff import Graded
 from .metric import Constant, Described
 from .recipe import Seed, Shaping
 
-DIGITS = 7
-"""Significant digits that scaled lengths keep: as many as single precision holds."""
+DIGITS = 6
+"""Significant digits that scaled lengths keep: as many as single precision gives back as they were typed."""
 
 
 def scaled(field: Described, factor: float) -> Described:

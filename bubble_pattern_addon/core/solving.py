@@ -120,7 +120,7 @@ def _by_diameter(region: Region, recipe: Recipe, surroundings: Surroundings) -> 
             f"An open area of {target:.1%} can't be reached by the diameter: pitch and limits let it come to "
             f"{reachable[1]:.1%} at most; make the limits or the edge offset smaller, or solve by the pitch"
         )
-    factor = min(trials, key=lambda trial: (abs(trial[1] - target), trial[0]))[0]
+    factor = float(min(trials, key=lambda trial: (abs(trial[1] - target), trial[0]))[0])
     found = replace(recipe, shaping=scaled_sizes(recipe.shaping, factor))
     check_recipe(found)
     pattern = reshaped(packed, region, found, surroundings)

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import replace
 
 import numpy as np
 
-from .mesh import Floats
+from .mesh import Floats, Ints
 from .pattern import Pattern
 from .region import Region
 from .wall import DEEPEST, near_wall
 
 # A probe this wide, in pitches, finds the wall under a feature's middle, whatever size the feature gets.
 PROBE = 0.02
+
+_known: dict[bytes, Floats] = {}
+"""The walls measured last, by the digest of places and base: a designer tries many sizes on one packing."""
 
 
 def near_thickness(pattern: Pattern, region: Region) -> Floats:
@@ -21,5 +25,20 @@ def near_thickness(pattern: Pattern, region: Region) -> Floats:
     """
     if not len(pattern):
         return np.zeros(0)
-    probe = replace(pattern, diameter=PROBE * pattern.pitch)
-    return near_wall(region.base, region.tree, probe, DEEPEST * pattern.pitch).thickness
+    key = _digest(
+        pattern.position, pattern.normal, pattern.pitch, region.base.vertices, region.base.triangles
+    )
+    if key not in _known:
+        probe = replace(pattern, diameter=PROBE * pattern.pitch)
+        thickness = near_wall(region.base, region.tree, probe, DEEPEST * pattern.pitch).thickness
+        thickness.flags.writeable = False
+        _known.clear()
+        _known[key] = thickness
+    return _known[key]
+
+
+def _digest(*arrays: Floats | Ints) -> bytes:
+    digest = hashlib.blake2b()
+    for array in arrays:
+        digest.update(np.ascontiguousarray(array))
+    return digest.digest()

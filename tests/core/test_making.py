@@ -22,11 +22,11 @@ from bubble_pattern_addon.core.pipeline import pattern_steps
 from bubble_pattern_addon.core.processes import PROCESSES
 from bubble_pattern_addon.core.progress import drive
 from bubble_pattern_addon.core.quality import Quality, min_web
-from bubble_pattern_addon.core.recipe import Limits, Output, Packing, Recipe, Shaping
+from bubble_pattern_addon.core.recipe import Feature, Limits, Output, Packing, Recipe, Shaping
 from bubble_pattern_addon.core.recipe_checks import check_recipe
 from bubble_pattern_addon.core.recipe_file import recipe_from_dict, recipe_to_toml
 from bubble_pattern_addon.core.region import Region, make_region
-from bubble_pattern_addon.core.results import UNKNOWN, mass, offenders, removed_estimate, results_of, words_of
+from bubble_pattern_addon.core.results import UNKNOWN, mass, offenders, results_of, words_of
 from bubble_pattern_addon.core.thickness import near_thickness
 from bubble_pattern_addon.core.units import MILLIMETRES, millimetre
 from scripts import shapes
@@ -51,7 +51,7 @@ def packed(region: Region, **recipe: object) -> Pattern:
 
 
 def in_plane(points: list[tuple[float, float]], diameters: list[float]) -> Pattern:
-    at = np.column_stack([np.array(points, dtype=float), np.zeros(len(points))])
+    at = np.column_stack([np.array(points, dtype=float).reshape(-1, 2), np.zeros(len(points))])
     return laid(at, np.array([0.0, 0, 1]), 3.0, np.array(diameters))
 
 
@@ -181,6 +181,17 @@ def test_what_is_kept_to_single_precision_is_kept() -> None:
     assert broken_rules(rounded, SHEET, floors_of(rounded, SHEET, wider))
 
 
+def test_results_say_what_a_finished_pattern_breaks_of_a_process(plate: Region) -> None:
+    """The pattern was shaped without it."""
+    pattern = packed(plate, limits=Limits(min_diameter=1.1))
+    assert results_of(pattern, plate, Recipe(limits=Limits(min_diameter=1.1))).broken == ()
+    asked = Recipe(limits=Limits(process="injection moulding", thickness=4.0))
+    found = {broken.rule for broken in results_of(pattern, plate, asked).broken}
+    assert found == {"web", "margin", "draft"}
+    kept = packed(plate, limits=Limits(process="cnc"))
+    assert results_of(kept, plate, Recipe(limits=Limits(process="cnc"))).broken == ()
+
+
 def test_a_process_that_leaves_nothing_is_told_with_its_lengths() -> None:
     with pytest.raises(
         RecipeError, match=r'No feature is left: "fdm print" asks for diameters from 2,.* 0\.5;'
@@ -278,7 +289,7 @@ def test_known_drills_are_there() -> None:
 )
 def test_the_smallest_web_lies_between_its_two_points(data: list[tuple[int, int, float]]) -> None:
     pattern = in_plane([(2.0 * x, 2.0 * y) for x, y, _ in data], [size for _, _, size in data])
-    results = results_of(pattern, SHEET)
+    results = results_of(pattern, SHEET, Recipe())
     web = results.smallest_web
     if web is None:
         assert min_web(pattern) == np.inf
@@ -294,7 +305,7 @@ def test_the_smallest_web_lies_between_its_two_points(data: list[tuple[int, int,
 
 def test_figures_of_three_features() -> None:
     pattern = in_plane([(0, 0), (3, 0), (7, 0)], [1.0, 2.0, 1.0])
-    results = results_of(pattern, SHEET, nominal=True)
+    results = results_of(pattern, SHEET, Recipe(shaping=Shaping(sizes=(1.0, 2.0))))
     assert results.smallest_web is not None
     assert results.smallest_web.ids == (0, 1)
     assert results.mean_web == pytest.approx((1.5 + 1.5 + 2.5) / 3)
@@ -304,7 +315,7 @@ def test_figures_of_three_features() -> None:
 
 
 def test_nothing_has_no_figures() -> None:
-    results = results_of(in_plane([], []), SHEET)
+    results = results_of(in_plane([], []), SHEET, Recipe())
     assert results.count == 0
     assert results.smallest_web is None
     assert np.isnan([results.smallest, results.largest, results.mean_web]).all()
@@ -312,7 +323,7 @@ def test_nothing_has_no_figures() -> None:
 
 
 def test_two_features_in_one_place_overlap_by_their_size() -> None:
-    web = results_of(in_plane([(0, 0), (0, 0)], [1.0, 2.0]), SHEET).smallest_web
+    web = results_of(in_plane([(0, 0), (0, 0)], [1.0, 2.0]), SHEET, Recipe()).smallest_web
     assert web is not None
     assert web.length == -1.5
     assert np.isfinite(web.between).all()
@@ -321,8 +332,10 @@ def test_two_features_in_one_place_overlap_by_their_size() -> None:
 def test_what_is_removed_and_what_it_weighs(plate: Region) -> None:
     pattern = packed(plate)
     area = np.pi / 4 * (pattern.diameter**2).sum()
-    assert removed_estimate(pattern, near_thickness(pattern, plate), None) == pytest.approx(1.5 * area)
-    assert removed_estimate(pattern, near_thickness(pattern, plate), 0.4) == pytest.approx(0.4 * area)
+    assert results_of(pattern, plate, Recipe()).removed == pytest.approx(1.5 * area)
+    assert results_of(pattern, plate, Recipe(feature=Feature(depth=0.4))).removed == pytest.approx(0.4 * area)
+    assert results_of(pattern, plate, Recipe(), 7.0).removed == 7.0
+    assert np.isnan(results_of(in_plane([(0, 0)], [1.0]), SHEET, Recipe()).removed)
     assert mass(1000.0, 2.7, millimetre(None)) == pytest.approx(2.7)  # one cubic centimetre
     assert mass(1e-6, 2.7, millimetre("m")) == pytest.approx(2.7)
 
