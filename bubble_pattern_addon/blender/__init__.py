@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from . import command, fixed_sizes, operators, panels, properties, versioning
+from . import command, fixed_sizes, offenders, operators, overlay, panels, properties, solving, versioning
 
-MODULES = (properties, operators, fixed_sizes, panels, versioning, command)
+MODULES = (properties, operators, fixed_sizes, solving, offenders, panels, versioning, overlay, command)
 
 
 def register() -> None:

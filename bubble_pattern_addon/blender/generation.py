@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import bpy
-import numpy as np
 
 from ..core.errors import PatternError
 from ..core.field_tables import Wanted, wanted
@@ -20,14 +19,16 @@ from ..core.mesh import Bools
 from ..core.pattern import Pattern
 from ..core.pipeline import pattern_steps
 from ..core.progress import Progress, Steps, drive
-from ..core.quality import Quality, measure, min_margin, min_web, open_area
+from ..core.quality import Quality, measure
 from ..core.recipe import Recipe, RegionChoice, default_recipe
 from ..core.recipe_file import recipe_from_dict
 from ..core.region import Region, make_region
+from ..core.results import Results, results_of
 from ..core.selection import select, sub_regions
 from ..core.shaping import reshaped
 from ..core.surroundings import Surroundings
 from .marked_side import on_marked_side
+from .noting import note_quality, note_results, noted_quality
 from .pattern_object import read_pattern, write_pattern, write_sizes
 from .preview_nodes import show_preview
 from .properties import SETTINGS_VERSION, in_scene, pattern_objects
@@ -45,9 +46,7 @@ class Laid:
 
     pattern: Pattern
     quality: Quality
-    web: float
-    margin: float
-    open_area: float
+    results: Results
     seconds: float
 
 
@@ -120,13 +119,12 @@ def laying_steps(source: Source, recipe: Recipe) -> Steps[Laid]:
     start = time.perf_counter()
     pattern = yield from pattern_steps(source.region, recipe, source.surroundings)
     yield Progress("Measuring", 1.0)
-    return measured(pattern, source.region, measure(pattern, source.region), start)
+    return measured(pattern, source.region, recipe, measure(pattern, source.region), start)
 
 
-def measured(pattern: Pattern, region: Region, quality: Quality, start: float) -> Laid:
+def measured(pattern: Pattern, region: Region, recipe: Recipe, quality: Quality, start: float) -> Laid:
     """`pattern` with its figures; `start` is when work on it began."""
-    web, margin, share = min_web(pattern), min_margin(pattern, region), open_area(pattern, region)
-    return Laid(pattern, quality, web, margin, share, time.perf_counter() - start)
+    return Laid(pattern, quality, results_of(pattern, region, recipe), time.perf_counter() - start)
 
 
 def put(obj: bpy.types.Object, source: Source, recipe: Recipe, laid: Laid) -> None:
@@ -134,8 +132,7 @@ def put(obj: bpy.types.Object, source: Source, recipe: Recipe, laid: Laid) -> No
     settings = obj.bubble_pattern
     write_pattern(obj, laid.pattern, settings.base, source.base)
     note(settings, source, recipe, laid)
-    settings.six = laid.quality.six if np.isfinite(laid.quality.six) else -1.0
-    settings.gap_min = laid.quality.gap_min if np.isfinite(laid.quality.gap_min) else -1.0
+    note_quality(settings, laid.quality)
     settings.seconds = laid.seconds
     show_preview(obj, settings.show_bubbles)
 
@@ -147,13 +144,10 @@ def note(settings: Any, source: Source, recipe: Recipe, laid: Laid) -> None:
     settings.size_trace = source.size_trace
     settings.version = SETTINGS_VERSION
     settings.trouble = ""
-    settings.count = len(laid.pattern)
     settings.shrunk = len(laid.pattern.shrunk)
     settings.dropped = 0 if laid.pattern.dropped is None else len(laid.pattern.dropped)
     settings.notes = " ".join(laid.pattern.notes)
-    settings.web = laid.web if np.isfinite(laid.web) else -1.0
-    settings.margin = laid.margin if np.isfinite(laid.margin) else -1.0
-    settings.open_area = laid.open_area
+    note_results(settings, laid.pattern, laid.results)
 
 
 def update_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[None]:
@@ -203,8 +197,7 @@ def reshape(obj: bpy.types.Object, context: bpy.types.Context) -> None:
         drive(update_steps(obj, context))
         return
     pattern = reshaped(read_pattern(obj, source.base.mesh), source.region, recipe, source.surroundings)
-    quality = Quality(settings.six, 0.0, 0.0, settings.gap_min, 0.0)
-    laid = measured(pattern, source.region, quality, start)
+    laid = measured(pattern, source.region, recipe, noted_quality(settings), start)
     write_sizes(obj, pattern)
     note(settings, source, recipe, laid)
 

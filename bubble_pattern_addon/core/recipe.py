@@ -15,7 +15,7 @@ from .isometries import OFF
 from .metric import Constant, Described
 from .nominal import Sizes
 from .toml_values import Point
-from .units import Unit
+from .units import Unit, millimetres_in
 
 INTEGRATORS = ("fire", "rk4")
 ORIENTATIONS = ("edge", "best")
@@ -143,8 +143,9 @@ class Output:
 
     formats: the part in these formats too (see FORMATS); blend: the base with the editable pattern as
     pattern.blend; picture: a rendered view of the part as part.png
-    density: of the part's material in g/cm3, for the mass of what is removed; unit: of the base's lengths,
-    one of core.units.MILLIMETRES or how many millimetres it is long, None for millimetres
+    density: of the part's material in g/cm3, for the mass of what is removed
+    unit: that of the recipe's lengths (see core.units), and of the base where its file does not say; None:
+    that of the base, or millimetres
     """
 
     blend: bool = False
@@ -165,6 +166,11 @@ class Recipe:
     limits: Limits = field(default_factory=Limits)
     solve: Solve = field(default_factory=Solve)
     output: Output = field(default_factory=Output)
+
+    @property
+    def millimetre(self) -> float:
+        """Length of a millimetre in the unit of the base: what drills and the rules of processes go by."""
+        return 1.0 / millimetres_in(self.output.unit or "mm")
 
 
 def neat(length: float) -> float:

@@ -24,7 +24,6 @@ from .recipe import (
     Shaping,
 )
 from .toml_values import check_above, check_at_least, check_finite, check_one_of
-from .units import check_unit
 
 # Share of the plane that a hexagonal arrangement of touching circles covers: pi / (2 sqrt 3).
 DENSEST = math.pi / (2 * math.sqrt(3))
@@ -126,8 +125,6 @@ def _check_limits(limits: Limits) -> None:
 def _check_output(output: Output) -> None:
     if output.density is not None:
         check_above(output.density, "[output] density")
-    if output.unit is not None:
-        check_unit(output.unit, "[output] unit")
     for name in output.formats:
         check_one_of(name, FORMATS, "[output] formats")
 

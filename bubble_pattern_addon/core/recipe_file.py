@@ -16,7 +16,7 @@ from .nominal import sizes_from_toml
 from .recipe import FILL, Recipe, Seed, rounded
 from .recipe_checks import check_choice, check_recipe
 from .toml_values import Point, flag, nearest, number, point, show, spell, text, texts, whole
-from .units import unit_from_toml
+from .units import read_unit
 
 
 def load_toml(path: Path) -> dict[str, Any]:
@@ -170,7 +170,7 @@ READERS: dict[str, dict[str, Callable[[object, str], Any]]] = {
         "process": text,
     },
     "solve": {"open_area": number, "count": whole, "by": text},
-    "output": {"blend": flag, "picture": flag, "formats": texts, "density": number, "unit": unit_from_toml},
+    "output": {"blend": flag, "picture": flag, "formats": texts, "density": number, "unit": read_unit},
 }
 
 

@@ -25,7 +25,6 @@ from .quality import Quality, min_margin, neighbours, open_area
 from .recipe import Recipe
 from .region import Region
 from .thickness import near_thickness
-from .units import millimetre
 
 WORDS = ("excellent", "good", "fair", "poor")
 UNKNOWN = "unknown"
@@ -81,7 +80,7 @@ def results_of(pattern: Pattern, region: Region, recipe: Recipe, removed: float 
     bubbles = all_bubbles(pattern)
     kept = np.searchsorted(bubbles.ids, pattern.ids)
     depth = recipe.feature.depth
-    floors = floors_of(bubbles, region, recipe.limits, depth, millimetre(recipe.output.unit)).take(kept)
+    floors = floors_of(bubbles, region, recipe.limits, depth, recipe.millimetre).take(kept)
     if removed is None:
         deep = near_thickness(bubbles, region)[kept] if depth is None else depth
         removed = float((np.pi / 4 * pattern.diameter**2 * deep).sum())
@@ -133,14 +132,6 @@ def web_between(pattern: Pattern, one: int, other: int) -> Web:
     between = ends + np.array([[1.0], [-1.0]]) * radius[:, None] * along
     ids = (int(pattern.ids[one]), int(pattern.ids[other]))
     return Web(distance - float(radius.sum()), ids, (one, other), between)
-
-
-def mass(volume: float, density: float, mm: float) -> float:
-    """Grams of a volume in the unit of the base cubed.
-
-    density: in g/cm3; mm: length of a millimetre in the unit of the base
-    """
-    return volume / mm**3 / 1000.0 * density
 
 
 def words_of(quality: Quality) -> dict[str, str]:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
+from .density import mass
 from .floors import Broken
 from .pattern import Pattern
 from .quality import Quality
 from .recipe import Recipe
 from .region import Region
-from .results import Web, mass, results_of, words_of
+from .results import Web, results_of, words_of
 from .solid import Part
 from .solving import Solved
-from .units import millimetre
 
 
 def results_report(
@@ -31,9 +31,7 @@ def results_report(
         "mean_web": results.mean_web,
         "smallest_web": _web(results.smallest_web),
         "diameter": {"min": results.smallest, "max": results.largest},
-        "removed_mass": None
-        if density is None
-        else mass(results.removed, density, millimetre(recipe.output.unit)),
+        "removed_mass": None if density is None else mass(results.removed, density, recipe.millimetre),
         "in_words": words_of(quality),
         "nominal": [{"diameter": size, "features": count} for size, count in results.sizes],
         "process": recipe.limits.process,

@@ -19,7 +19,6 @@ from .recipe import Recipe, Shaping
 from .region import Region
 from .surroundings import Surroundings
 from .toml_values import show
-from .units import millimetre
 
 
 def bound(described: Described, surroundings: Surroundings, where: str) -> Field:
@@ -42,7 +41,7 @@ def shaped(
     FieldError where the surroundings lack something.
     """
     wished, notes = diameters(recipe.shaping, bubbles, links, replace(surroundings, region=region))
-    mm = millimetre(recipe.output.unit)
+    mm = recipe.millimetre
     floors = floors_of(bubbles, region, recipe.limits, recipe.feature.depth, mm)
     pattern = limited_by(
         replace(bubbles, diameter=wished, notes=(*bubbles.packing_notes, *notes, *floors.notes)),

@@ -34,7 +34,6 @@ from .region import Region
 from .scaling import scaled, scaled_sizes
 from .shaping import bound, reshaped
 from .surroundings import NOTHING, Surroundings
-from .units import millimetre
 from .webs import LEAST_WEB
 
 # What is wanted is met within this share of it, or within one feature.
@@ -100,7 +99,7 @@ def _by_diameter(region: Region, recipe: Recipe, surroundings: Surroundings) -> 
     packed = yield from within(pattern_steps(region, free, surroundings), 0.0, 0.8)
     bubbles = all_bubbles(packed)
     wished = bubbles.diameter if bubbles.wished is None else bubbles.wished
-    mm = millimetre(recipe.output.unit)
+    mm = recipe.millimetre
     floors = floors_of(bubbles, region, recipe.limits, recipe.feature.depth, mm)
     sizes = nominal_sizes(recipe.shaping.sizes, mm)
 

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bubble_pattern_addon.core.density import mass
 from bubble_pattern_addon.core.distance import boundary_distance
 from bubble_pattern_addon.core.errors import RecipeError
 from bubble_pattern_addon.core.fields import Linear
@@ -26,9 +27,9 @@ from bubble_pattern_addon.core.recipe import Feature, Limits, Output, Packing, R
 from bubble_pattern_addon.core.recipe_checks import check_recipe
 from bubble_pattern_addon.core.recipe_file import recipe_from_dict, recipe_to_toml
 from bubble_pattern_addon.core.region import Region, make_region
-from bubble_pattern_addon.core.results import UNKNOWN, mass, offenders, results_of, words_of
+from bubble_pattern_addon.core.results import UNKNOWN, offenders, results_of, words_of
 from bubble_pattern_addon.core.thickness import near_thickness
-from bubble_pattern_addon.core.units import MILLIMETRES, millimetre
+from bubble_pattern_addon.core.units import UNITS, Unit
 from scripts import shapes
 from tests.core.bases import box, laid
 
@@ -43,6 +44,10 @@ GRADED = Linear(from_=1.0, to=5.5, direction=(1.0, 0.0, 0.0))
 def plate() -> Region:
     """The top of a plate 1.5 thick."""
     return make_region(PLATE, TOP)
+
+
+def millimetre(unit: Unit | None) -> float:
+    return Recipe(output=Output(unit=unit)).millimetre
 
 
 def packed(region: Region, **recipe: object) -> Pattern:
@@ -372,7 +377,7 @@ def test_the_new_keys_are_written_and_read_back() -> None:
     assert recipe_from_dict(tomllib.loads(recipe_to_toml(recipe))) == recipe
     other = recipe_from_dict(tomllib.loads(REGION + "[shaping]\nsizes = [1, 2.5]\n[output]\nunit = 0.5\n"))
     assert other.shaping.sizes == (1.0, 2.5)
-    assert millimetre(other.output.unit) == 2.0
+    assert other.millimetre == 2.0
     assert recipe_from_dict(tomllib.loads(recipe_to_toml(other))) == other
     assert "[solve]" not in recipe_to_toml(other)
 
@@ -387,7 +392,7 @@ def test_the_new_keys_are_written_and_read_back() -> None:
         ("[shaping]\nsizes = [1.0, -2.0]", r"sizes = -2 must be a number above 0"),
         ("[shaping]\nsizes = 3.0", r"sizes = 3.0 must be a list"),
         ("[output]\ndensity = 0.0", r"density = 0 must be a number above 0"),
-        ('[output]\nunit = "mile"', r'unit = "mile" is not known'),
+        ('[output]\nunit = "mile"', r'unit = "mile" is no unit'),
         ("[output]\nunit = -1.0", r"unit = -1 must be a number above 0"),
         ("[output]\nunit = true", r"unit = true must be a number"),
         ('[solve]\nby = "pitch"', r"\[solve\] has no target"),
@@ -413,5 +418,5 @@ def test_a_count_alone_lets_the_diameter_follow_the_pitch() -> None:
 
 
 def test_every_unit_is_known_by_its_millimetres() -> None:
-    assert {name: 1 / millimetre(name) for name in MILLIMETRES} == pytest.approx(MILLIMETRES)
+    assert {name: 1 / millimetre(name) for name in UNITS} == pytest.approx(UNITS)
     assert millimetre(None) == 1.0
