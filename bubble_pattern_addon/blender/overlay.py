@@ -41,11 +41,21 @@ def wished_in_file() -> bool:
     return any(obj.bubble_pattern.base is not None and obj.bubble_pattern.show_marks for obj in objects)
 
 
+def in_background() -> bool:
+    """Whether Blender has no window to draw in."""
+    return bool(bpy.app.background)
+
+
+def drawing_space() -> Any:
+    """The kind of space that we draw in."""
+    return bpy.types.SpaceView3D
+
+
 def refresh(context: bpy.types.Context | None = None) -> None:
     """Let the handlers be there where marks are wished for, and only there; draw anew."""
-    wished = not bpy.app.background and wished_in_file()
+    wished = not in_background() and wished_in_file()
     if wished and not _handles:
-        add = bpy.types.SpaceView3D.draw_handler_add
+        add = drawing_space().draw_handler_add
         _handles.append(add(draw_lines, (), 'WINDOW', 'POST_VIEW'))
         _handles.append(add(draw_labels, (), 'WINDOW', 'POST_PIXEL'))
     elif not wished:
@@ -59,7 +69,7 @@ def refresh(context: bpy.types.Context | None = None) -> None:
 def remove() -> None:
     """Take the handlers away."""
     while _handles:
-        bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), 'WINDOW')
+        drawing_space().draw_handler_remove(_handles.pop(), 'WINDOW')
     _rings.clear()
 
 

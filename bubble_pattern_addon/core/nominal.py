@@ -103,7 +103,7 @@ def snapped(diameter: Floats, sizes: Floats) -> Floats:
     the smallest.
     """
     below = np.searchsorted(sizes, diameter * (1 + SAME), side="right")
-    return np.where(below > 0, np.minimum(sizes[below - 1], diameter), 0.0)
+    return np.where(below > 0, sizes[below - 1], 0.0)
 
 
 def next_above(lengths: Floats, sizes: Floats) -> Floats:
