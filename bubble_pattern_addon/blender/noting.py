@@ -17,7 +17,7 @@ from .pattern_object import point_ids
 
 RULES = ("hole", "slender", "web", "margin", "draft")
 BROKEN = "broken"
-"""The points' attribute: the sum of 1, 2, 4, ... for the first, second, ... of RULES that the feature breaks."""
+"""The points' attribute: the sum of 1, 2, 4, ... for the first, second, ... RULES that the feature breaks."""
 
 
 def known(value: float) -> float:
