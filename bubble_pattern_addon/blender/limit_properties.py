@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from bpy.props import EnumProperty
+from bpy.props import BoolProperty, EnumProperty
 
 from .field_properties import length_property
 from .reacting import reshape
@@ -60,5 +60,11 @@ class LimitSettings:
         description="Thickness of the wall that the rules go by, or 0 to measure it under each feature",
         default=0.0,
         min=0.0,
+        update=reshape,
+    )
+    check_only: BoolProperty(
+        name="Only Check",
+        description="Leave the features as they are, and only tell which of them break a rule of the process",
+        default=False,
         update=reshape,
     )

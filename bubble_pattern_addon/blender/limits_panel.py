@@ -19,7 +19,10 @@ class BUBBLE_PATTERN_PT_limits(SettingsPanel, bpy.types.Panel):
         column = columns(self.layout)
         column.prop(settings, "process")
         if settings.process != 'NONE':
-            column.prop(settings, "thickness", text="Thickness (0 = Measured)")
+            column.prop(settings, "thickness")
+            if settings.thickness == 0:
+                column.label(text="0: measured under each feature", icon='BLANK1')
+            column.prop(settings, "check_only")
         for field in ("min_web", "min_margin", "min_diameter"):
             column.prop(settings, field)
 

@@ -38,6 +38,7 @@ def limits_of(settings: Any) -> Limits:
         min_diameter=typed(settings.min_diameter),
         process=PROCESS_WORDS.get(settings.process),
         thickness=typed(settings.thickness) or None,
+        check_only=settings.check_only,
     )
 
 
@@ -48,6 +49,7 @@ def take_limits(settings: Any, limits: Limits) -> None:
     settings.min_diameter = limits.min_diameter
     settings.process = _key(PROCESS_WORDS, limits.process) or 'NONE'
     settings.thickness = limits.thickness or 0.0
+    settings.check_only = limits.check_only
 
 
 def sizes_of(settings: Any) -> tuple[float, ...] | str | None:

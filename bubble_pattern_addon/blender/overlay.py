@@ -164,7 +164,7 @@ def draw_lines() -> None:
             rings = rings_of(obj)
             if rings is not None:
                 gpu.state.depth_test_set('LESS_EQUAL')
-                lines.uniform_float("lineWidth", 2.5 * scale)
+                lines.uniform_float("lineWidth", 3.0 * scale)
                 lines.uniform_float("color", BAD)
                 rings.draw(lines)
             web = web_lines(obj)

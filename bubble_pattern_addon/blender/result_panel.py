@@ -76,9 +76,12 @@ def size_figures(context: bpy.types.Context, settings: Any) -> list[Figure]:
             figures.append(Figure(name, f"{count:,}"))
     if settings.smallest >= 0:
         alert = bool(broken & {"hole", "slender"})
-        figures.append(Figure("Diameter", span_text(context, settings.smallest, settings.largest), alert))
+        texts = [length_text(context, size) for size in (settings.smallest, settings.largest)]
+        names = ["Diameter"] if texts[0] == texts[1] else ["Smallest Size", "Largest Size"]
+        figures.append(Figure(names[0], texts[0], alert))
+        figures += [Figure(name, texts[1]) for name in names[1:]]
     figures += [Figure(name, text) for name, text in nominal_rows(context, settings)]
-    if settings.count > 1:
+    if settings.web_ids[0] >= 0:
         alert = settings.web < 0 or "web" in broken
         figures.append(Figure("Smallest Web", length_text(context, settings.web), alert))
     if settings.mean_web >= 0:
@@ -87,12 +90,6 @@ def size_figures(context: bpy.types.Context, settings: Any) -> list[Figure]:
         figures.append(Figure("Smallest Margin", length_text(context, settings.margin), "margin" in broken))
     figures.append(Figure("Open Area", f"{settings.open_area:.1%}"))
     return figures
-
-
-def span_text(context: bpy.types.Context, low: float, high: float) -> str:
-    """A length, or two where they differ."""
-    one, other = length_text(context, low), length_text(context, high)
-    return one if one == other else f"{one} – {other}"  # noqa: RUF001
 
 
 def nominal_rows(context: bpy.types.Context, settings: Any) -> list[tuple[str, str]]:
@@ -136,7 +133,7 @@ def quality_figures(settings: Any) -> list[Figure]:
     behind = {
         "order": f"{settings.six:.0%} six",
         "gaps": f"±{settings.gap_cv:.1%}",
-        "smallest_gap": f"{settings.gap_min:.2f} pitch",
+        "smallest_gap": f"{settings.gap_min:.2f}",
         "first_row": f"±{settings.rim_cv:.1%}",
     }
     entries = [entry.split(",") for entry in settings.words.split(";") if entry]
@@ -156,20 +153,16 @@ def draw_broken(context: bpy.types.Context, layout: bpy.types.UILayout, one: Any
 
 
 def broken_text(context: bpy.types.Context, one: Any) -> str:
-    """Which rule, how many features, and how far the worst falls short."""
+    """Which rule, and how many features break it; how far the worst falls short is among the figures."""
+    least = f"{one.least:g}°" if one.rule == "draft" else length_text(context, one.least)
     what = {
-        "hole": "too small",
-        "slender": "too deep",
-        "web": "with narrow webs",
-        "margin": "near the edge",
-        "draft": "without draft",
+        "hole": f"smaller than {least}",
+        "slender": f"too deep below {least}",
+        "web": f"with a web < {least}",
+        "margin": f"with a margin < {least}",
+        "draft": f"with draft < {least}",
     }
-    if one.rule == "draft":
-        return f"{one.count:,} {what[one.rule]}: {one.worst:.1f}° < {one.least:.1f}°"
-    return (
-        f"{one.count:,} {what[one.rule]}: "
-        f"{length_text(context, one.worst)} < {length_text(context, one.least)}"
-    )
+    return f"{one.count:,} {what[one.rule]}"
 
 
 class BUBBLE_PATTERN_PT_solve(SettingsPanel, bpy.types.Panel):

@@ -75,14 +75,15 @@ def floors_of(
     depth: float | None = None,
     millimetre: float = 1.0,
 ) -> Floors:
-    """Floors of these bubbles, whatever diameters they have.
+    """Floors of these bubbles, whatever diameters they have; of the limits alone where the process shall only
+    be checked.
 
     depth: of blind features; None: they go through the near wall; millimetre: in the unit of the base
     """
     n = len(bubbles)
     lengths = (limits.min_diameter, limits.min_web, limits.min_margin)
     hole, web, margin = (np.full(n, max(least, 0.0)) for least in lengths)
-    if limits.process is None:
+    if limits.process is None or limits.check_only:
         return Floors(hole, np.zeros(n), web, margin)
     process = PROCESSES[limits.process]
     known = limits.thickness

@@ -113,7 +113,8 @@ class Limits:
     min_web: material between two features; min_margin: from a feature's edge to the region's boundary;
     min_diameter: a feature that would have to be smaller is left out
     process: whose rules hold too, one of PROCESSES (see core.processes); thickness: of the wall that they go
-    by, None for the near wall as it is measured under each feature
+    by, None for the near wall as it is measured under each feature; check_only: they shape nothing, it is only
+    told who breaks them
     """
 
     min_web: float = 0.0
@@ -121,6 +122,7 @@ class Limits:
     min_diameter: float = 0.0
     process: str | None = None
     thickness: float | None = None
+    check_only: bool = False
 
 
 @dataclass(frozen=True)

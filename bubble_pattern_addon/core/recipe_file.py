@@ -168,6 +168,7 @@ READERS: dict[str, dict[str, Callable[[object, str], Any]]] = {
     "limits": {
         **dict.fromkeys(("min_web", "min_margin", "min_diameter", "thickness"), number),
         "process": text,
+        "check_only": flag,
     },
     "solve": {"open_area": number, "count": whole, "by": text},
     "output": {"blend": flag, "picture": flag, "formats": texts, "density": number, "unit": read_unit},

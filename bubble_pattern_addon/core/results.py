@@ -13,7 +13,7 @@ grid by 18.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -80,7 +80,8 @@ def results_of(pattern: Pattern, region: Region, recipe: Recipe, removed: float 
     bubbles = all_bubbles(pattern)
     kept = np.searchsorted(bubbles.ids, pattern.ids)
     depth = recipe.feature.depth
-    floors = floors_of(bubbles, region, recipe.limits, depth, recipe.millimetre).take(kept)
+    limits = replace(recipe.limits, check_only=False)
+    floors = floors_of(bubbles, region, limits, depth, recipe.millimetre).take(kept)
     if removed is None:
         deep = near_thickness(bubbles, region)[kept] if depth is None else depth
         removed = float((np.pi / 4 * pattern.diameter**2 * deep).sum())

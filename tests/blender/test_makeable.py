@@ -93,6 +93,12 @@ def test_a_process_goes_by_the_measured_wall(pattern: bpy.types.Object) -> None:
     assert settings.margin >= 1.5 * MM * (1 - 1e-5)
     assert settings.smallest >= 1 * MM * (1 - 1e-5)
     assert len(settings.broken) == 0
+    settings.check_only = True
+    assert settings.web < 0.9 * MM
+    assert {one.rule for one in settings.broken} == {"web", "margin"}
+    assert broken_text(bpy.context, settings.broken[0]).endswith("< 1 mm")
+    settings.check_only = False
+    assert len(settings.broken) == 0
     settings.thickness = 2 * MM
     assert settings.web >= 2 * MM * (1 - 1e-5)
     assert not is_outdated(settings)
@@ -118,7 +124,7 @@ def test_what_breaks_a_rule_of_the_process_is_told_and_marked(pattern: bpy.types
     settings.process = 'INJECTION_MOULDING'
     (draft,) = settings.broken
     assert (draft.rule, draft.count) == ("draft", settings.count)
-    assert broken_text(bpy.context, draft) == f"{settings.count} without draft: 0.0° < 1.0°"
+    assert broken_text(bpy.context, draft) == f"{settings.count} with draft < 1°"
     marks = points(pattern, noting.BROKEN)
     assert (marks[points(pattern, "diameter") > 0] == 1 << noting.RULES.index("draft")).all()
     activate(settings.base)
@@ -178,7 +184,7 @@ def test_settings_and_recipe_are_the_same_thing(pattern: bpy.types.Object, syste
             "region": {"attribute": settings.region},
             "packing": {"pitch": 0.004},
             "shaping": {"diameter": 0.002, "sizes": [0.0015, 0.002]},
-            "limits": {"process": "laser", "thickness": 0.0012},
+            "limits": {"process": "laser", "thickness": 0.0012, "check_only": True},
             "output": {"density": 2.7, "unit": "m"},
         }
     )

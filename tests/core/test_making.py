@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -193,8 +194,16 @@ def test_results_say_what_a_finished_pattern_breaks_of_a_process(plate: Region) 
     asked = Recipe(limits=Limits(process="injection moulding", thickness=4.0))
     found = {broken.rule for broken in results_of(pattern, plate, asked).broken}
     assert found == {"web", "margin", "draft"}
+    checked = packed(plate, limits=Limits(min_diameter=1.1, check_only=True, **vars_of(asked)))
+    assert np.array_equal(checked.diameter, pattern.diameter)
+    only = Recipe(limits=Limits(check_only=True, **vars_of(asked)))
+    assert {broken.rule for broken in results_of(checked, plate, only).broken} == found
     kept = packed(plate, limits=Limits(process="cnc"))
     assert results_of(kept, plate, Recipe(limits=Limits(process="cnc"))).broken == ()
+
+
+def vars_of(recipe: Recipe) -> dict[str, Any]:
+    return {"process": recipe.limits.process, "thickness": recipe.limits.thickness}
 
 
 def test_a_process_that_leaves_nothing_is_told_with_its_lengths() -> None:
@@ -367,12 +376,13 @@ REGION = "[region]\nall = true\n"
 
 def test_the_new_keys_are_written_and_read_back() -> None:
     text = REGION + (
-        '[shaping]\ndiameter = 2.0\nsizes = "drills 0.5"\n[limits]\nprocess = "laser"\nthickness = 1.2\n'
+        '[shaping]\ndiameter = 2.0\nsizes = "drills 0.5"\n'
+        '[limits]\nprocess = "laser"\nthickness = 1.2\ncheck_only = true\n'
         '[solve]\nopen_area = 0.3\nby = "pitch"\n[output]\ndensity = 7.85\nunit = "cm"\n'
     )
     recipe = recipe_from_dict(tomllib.loads(text))
     assert recipe.shaping.sizes == "drills 0.5"
-    assert (recipe.limits.process, recipe.limits.thickness) == ("laser", 1.2)
+    assert recipe.limits == Limits(process="laser", thickness=1.2, check_only=True)
     assert recipe.output.unit == "cm"
     assert recipe_from_dict(tomllib.loads(recipe_to_toml(recipe))) == recipe
     other = recipe_from_dict(tomllib.loads(REGION + "[shaping]\nsizes = [1, 2.5]\n[output]\nunit = 0.5\n"))
