@@ -113,8 +113,8 @@ class Limits:
     min_web: material between two features; min_margin: from a feature's edge to the region's boundary;
     min_diameter: a feature that would have to be smaller is left out
     process: whose rules hold too, one of PROCESSES (see core.processes); thickness: of the wall that they go
-    by, None for the near wall as it is measured under each feature; check_only: they shape nothing, it is only
-    told who breaks them
+    by, None for the near wall as it is measured under each feature; check_only: they shape nothing, and it is
+    only told who breaks them
     """
 
     min_web: float = 0.0
