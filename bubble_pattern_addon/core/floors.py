@@ -116,14 +116,21 @@ class Broken:
 
 
 def broken_rules(
-    pattern: Pattern, region: Region, floors: Floors, draft: float = 0.0, least_draft: float = 0.0
+    pattern: Pattern,
+    region: Region,
+    floors: Floors,
+    edge: Floats | None = None,
+    draft: float = 0.0,
+    least_draft: float = 0.0,
 ) -> tuple[Broken, ...]:
     """What the pattern as it stands breaks of its `floors`; nothing of what it keeps.
 
+    edge: (n,) distances of the features' centres from the region's boundary, where they are known already
     draft, least_draft: of the features' walls and what the process asks for, in degrees
     """
     n, diameter = len(pattern), pattern.diameter
-    edge = boundary_distance(pattern.position, region.boundary_segments)
+    if edge is None:
+        edge = boundary_distance(pattern.position, region.boundary_segments)
     rules = (
         ("hole", diameter, floors.hole),
         ("slender", diameter, floors.slender),

@@ -17,17 +17,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .distance import boundary_distance
 from .floors import Broken, broken_rules, floors_of
-from .mesh import Floats, Ints
+from .mesh import Floats, Ints, digest
 from .pattern import Pattern, all_bubbles
 from .processes import PROCESSES
-from .quality import Quality, min_margin, neighbours, open_area
+from .quality import Neighbours, Quality, neighbours, open_area
 from .recipe import Recipe
 from .region import Region
 from .thickness import near_thickness
 
 WORDS = ("excellent", "good", "fair", "poor")
 UNKNOWN = "unknown"
+
+_known: dict[bytes, Neighbours] = {}
+"""The neighbours found last, by the digest of their places: a designer tries many sizes on one packing."""
 
 # From which figure on a word may be said, best first; the last word needs none.
 ORDER = (0.9, 0.8, 0.65)
@@ -86,9 +90,9 @@ def results_of(pattern: Pattern, region: Region, recipe: Recipe, removed: float 
         deep = near_thickness(bubbles, region)[kept] if depth is None else depth
         removed = float((np.pi / 4 * pattern.diameter**2 * deep).sum())
     process = recipe.limits.process
-    broken = broken_rules(
-        pattern, region, floors, least_draft=0.0 if process is None else PROCESSES[process].draft
-    )
+    edge = boundary_distance(pattern.position, region.boundary_segments)
+    least_draft = 0.0 if process is None else PROCESSES[process].draft
+    broken = broken_rules(pattern, region, floors, edge, least_draft=least_draft)
     web, mean = webs(pattern)
     diameter = pattern.diameter
     some = len(pattern) > 0
@@ -98,7 +102,7 @@ def results_of(pattern: Pattern, region: Region, recipe: Recipe, removed: float 
         count=len(pattern),
         smallest_web=web,
         mean_web=mean,
-        min_margin=min_margin(pattern, region),
+        min_margin=float((edge - diameter / 2).min(initial=np.inf)),
         smallest=float(diameter.min()) if some else np.nan,
         largest=float(diameter.max()) if some else np.nan,
         open_area=open_area(pattern, region),
@@ -112,7 +116,7 @@ def webs(pattern: Pattern) -> tuple[Web | None, float]:
     """The smallest web, and the mean over the features of the web to the nearest neighbour; None and nan
     where no two features are neighbours.
     """
-    near = neighbours(pattern.position, pattern.normal, pattern.pitch)
+    near = _neighbours(pattern)
     if not len(near.first):
         return None, np.nan
     width = near.distance - (pattern.diameter[near.first] + pattern.diameter[near.second]) / 2
@@ -122,6 +126,14 @@ def webs(pattern: Pattern) -> tuple[Web | None, float]:
     low, high = np.minimum(near.first, near.second), np.maximum(near.first, near.second)
     at = np.lexsort((high, low, width))[0]
     return web_between(pattern, int(low[at]), int(high[at])), float(own[np.isfinite(own)].mean())
+
+
+def _neighbours(pattern: Pattern) -> Neighbours:
+    key = digest(pattern.position, pattern.normal, pattern.pitch)
+    if key not in _known:
+        _known.clear()
+        _known[key] = neighbours(pattern.position, pattern.normal, pattern.pitch)
+    return _known[key]
 
 
 def web_between(pattern: Pattern, one: int, other: int) -> Web:

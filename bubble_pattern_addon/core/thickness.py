@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import replace
 
 import numpy as np
 
-from .mesh import Floats, Ints
+from .mesh import Floats, digest
 from .pattern import Pattern
 from .region import Region
 from .wall import DEEPEST, near_wall
@@ -25,9 +24,7 @@ def near_thickness(pattern: Pattern, region: Region) -> Floats:
     """
     if not len(pattern):
         return np.zeros(0)
-    key = _digest(
-        pattern.position, pattern.normal, pattern.pitch, region.base.vertices, region.base.triangles
-    )
+    key = digest(pattern.position, pattern.normal, pattern.pitch, region.base.vertices, region.base.triangles)
     if key not in _known:
         probe = replace(pattern, diameter=PROBE * pattern.pitch)
         thickness = near_wall(region.base, region.tree, probe, DEEPEST * pattern.pitch).thickness
@@ -35,10 +32,3 @@ def near_thickness(pattern: Pattern, region: Region) -> Floats:
         _known.clear()
         _known[key] = thickness
     return _known[key]
-
-
-def _digest(*arrays: Floats | Ints) -> bytes:
-    digest = hashlib.blake2b()
-    for array in arrays:
-        digest.update(np.ascontiguousarray(array))
-    return digest.digest()
