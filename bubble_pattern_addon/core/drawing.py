@@ -20,8 +20,6 @@ from .region import Region, boundary_loops, make_region
 from .surface import Charts, Complex, make_charts, to_frame
 from .toml_values import Point
 
-PROJECTIONS = ("flat", "normal")
-ALIGNMENTS = ("base", "rows")
 # Of the drawing's size: what stays free between parts that are laid flat side by side.
 GAP = 0.05
 # Mean of unit normals below which a part, such as a tube, faces no way in particular.
@@ -194,7 +192,9 @@ def _laid_flat(region: Region, pattern: Pattern, align: str, shapes: Shapes) -> 
     rows = to_frame(charts, row, pattern.tangent) * turn[row]
     upright = _upright(whole, charts, flat, turn)
     if align == "rows":
-        upright = upright * np.exp(-1j * _row_angles(rows * upright[flat.part[row]], flat.part[row], len(upright)))
+        upright = upright * np.exp(
+            -1j * _row_angles(rows * upright[flat.part[row]], flat.part[row], len(upright))
+        )
     corners = _side_by_side(flat.corners * upright[flat.part][:, None], flat.part)
     centre = np.einsum("nk,nk->n", pattern.places.barycentric, corners[row])
     _refuse_overlap(centre, pattern)
@@ -308,7 +308,9 @@ def _reaching(centre: Floats, diameter: Floats, cuts: tuple[Line, ...]) -> int:
         length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         number = np.ceil(length / step).astype(np.int64) + 1
         owner = np.repeat(np.arange(len(ends)), number)
-        share = (np.arange(len(owner)) - np.repeat(np.cumsum(number) - number, number)) / (number[owner] - 1).clip(1)
+        share = (np.arange(len(owner)) - np.repeat(np.cumsum(number) - number, number)) / (
+            number[owner] - 1
+        ).clip(1)
         samples.append(ends[owner, 0] + share[:, None] * (ends[owner, 1] - ends[owner, 0]))
     distance, _ = cKDTree(np.concatenate(samples)).query(centre)
     return int((distance < diameter / 2 * (1 - 1e-3)).sum())

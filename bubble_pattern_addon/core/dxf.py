@@ -165,7 +165,17 @@ def _tables(handles: Iterator[int]) -> Iterator[Pair]:
             for name, colour in {"0": 7, **LAYERS}.items()
         ],
     )
-    style = [(2, "Standard"), (70, 0), (40, 0.0), (41, 1.0), (50, 0.0), (71, 0), (42, 2.5), (3, "txt"), (4, "")]
+    style = [
+        (2, "Standard"),
+        (70, 0),
+        (40, 0.0),
+        (41, 1.0),
+        (50, 0.0),
+        (71, 0),
+        (42, 2.5),
+        (3, "txt"),
+        (4, ""),
+    ]
     yield from _table("STYLE", STYLES, [_record("STYLE", "TextStyle", next(handles), STYLES, *style)])
     yield from _table("VIEW", VIEWS, [])
     yield from _table("UCS", FRAMES, [])
@@ -190,7 +200,13 @@ def _blocks(handles: Iterator[int]) -> Iterator[Pair]:
     for owner, name in ((MODEL, "*Model_Space"), (PAPER, "*Paper_Space")):
         yield from [(0, "BLOCK"), (5, _hex(next(handles))), (330, _hex(owner)), (100, "AcDbEntity"), (8, "0")]
         yield from [(100, "AcDbBlockBegin"), (2, name), (70, 0), *_point(0.0, 0.0), (3, name), (1, "")]
-        yield from [(0, "ENDBLK"), (5, _hex(next(handles))), (330, _hex(owner)), (100, "AcDbEntity"), (8, "0")]
+        yield from [
+            (0, "ENDBLK"),
+            (5, _hex(next(handles))),
+            (330, _hex(owner)),
+            (100, "AcDbEntity"),
+            (8, "0"),
+        ]
         yield (100, "AcDbBlockEnd")
 
 
@@ -200,9 +216,7 @@ def _objects() -> Iterator[Pair]:
         for name, entry in entries:
             yield from [(3, name), (350, _hex(entry))]
 
-    yield from dictionary(
-        "DICTIONARY", ROOT, 0, ("ACAD_GROUP", GROUPS), ("ACAD_PLOTSTYLENAME", PLOT_STYLES)
-    )
+    yield from dictionary("DICTIONARY", ROOT, 0, ("ACAD_GROUP", GROUPS), ("ACAD_PLOTSTYLENAME", PLOT_STYLES))
     yield from dictionary("DICTIONARY", GROUPS, ROOT)
     yield from dictionary("ACDBDICTIONARYWDFLT", PLOT_STYLES, ROOT, ("Normal", PLOT_NORMAL))
     yield from [(100, "AcDbDictionaryWithDefault"), (340, _hex(PLOT_NORMAL))]
@@ -225,9 +239,7 @@ def _entities(drawing: Drawing, handles: Iterator[int]) -> Iterator[str]:
 
 
 def _entity(kind: str, cls: str, layer: str, handle: int) -> str:
-    return (
-        f"0\n{kind}\n5\n{handle:X}\n330\n{MODEL:X}\n100\nAcDbEntity\n8\n{layer}\n100\nAcDb{cls}\n"
-    )
+    return f"0\n{kind}\n5\n{handle:X}\n330\n{MODEL:X}\n100\nAcDbEntity\n8\n{layer}\n100\nAcDb{cls}\n"
 
 
 def _features(drawing: Drawing, handles: Iterator[int]) -> Iterator[str]:

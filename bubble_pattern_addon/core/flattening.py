@@ -73,7 +73,9 @@ def _flattened(region: Region, local: Complex, cuts: Bools) -> Flat:
     first[vertex.ravel()] = np.arange(vertex.size)
     space = region.corners.reshape(-1, 3)[first]
     sheet = region.sheet[first // 3]
-    conformal = _true_size(_conformal(local, vertex, _two_far_apart(space, sheet)), local, vertex, region.sheet)
+    conformal = _true_size(
+        _conformal(local, vertex, _two_far_apart(space, sheet)), local, vertex, region.sheet
+    )
     least = _least_stretch(local, vertex, sheet, conformal, region.extent)
     found = min((least, conformal), key=lambda flat: _stretch(local, flat[vertex]))
     return Flat(found[vertex], cuts, region.sheet, _stretch(local, found[vertex]))

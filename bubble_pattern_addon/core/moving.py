@@ -27,15 +27,24 @@ def moved_recipe(recipe: Recipe, matrix: Floats, region: Region) -> Recipe:
     if np.array_equal(matrix, np.eye(4)):
         return recipe
     packing, shaping, choice = recipe.packing, recipe.shaping, recipe.region
-    orientation = packing.orientation
+    orientation, projection = packing.orientation, recipe.output.projection
     if not isinstance(orientation, str):
         orientation = _turned(orientation, matrix)
+    if not isinstance(projection, str):
+        projection = _turned(projection, matrix)
+    centre = packing.symmetry_centre
     seeds = tuple(replace(seed, at=_moved_point(seed.at, matrix)) for seed in shaping.seeds)
     return replace(
         recipe,
         region=replace(choice, near=None if choice.near is None else _moved_point(choice.near, matrix)),
-        packing=replace(packing, pitch=moved(packing.pitch, matrix, region), orientation=orientation),
+        packing=replace(
+            packing,
+            pitch=moved(packing.pitch, matrix, region),
+            orientation=orientation,
+            symmetry_centre=None if centre is None else _moved_point(centre, matrix),
+        ),
         shaping=replace(shaping, diameter=moved(shaping.diameter, matrix, region), seeds=seeds),
+        output=replace(recipe.output, projection=projection),
     )
 
 

@@ -9,7 +9,20 @@ from .errors import RecipeError
 from .field_tables import asks_for_pitch
 from .isometries import check_symmetry
 from .metric import Constant, Described
-from .recipe import FORMATS, INTEGRATORS, KINDS, ORIENTATIONS, SOLVERS, Recipe, RegionChoice, Shaping
+from .recipe import (
+    ALIGNMENTS,
+    DRAWINGS,
+    FORMATS,
+    INTEGRATORS,
+    KINDS,
+    ORIENTATIONS,
+    PROJECTIONS,
+    SOLVERS,
+    Output,
+    Recipe,
+    RegionChoice,
+    Shaping,
+)
 from .toml_values import check_above, check_at_least, check_finite, check_one_of
 
 
@@ -61,9 +74,20 @@ def check_recipe(recipe: Recipe) -> None:
     check_at_least(limits.min_web, 0, "[limits] min_web")
     check_at_least(limits.min_margin, 0, "[limits] min_margin")
     check_at_least(limits.min_diameter, 0, "[limits] min_diameter")
-    for name in recipe.output.formats:
-        check_one_of(name, FORMATS, "[output] formats")
+    _check_output(recipe.output)
     _check_room(recipe)
+
+
+def _check_output(output: Output) -> None:
+    for name in output.formats:
+        check_one_of(name, FORMATS, "[output] formats")
+    for name in output.drawings:
+        check_one_of(name, DRAWINGS, "[output] drawings")
+    if isinstance(output.projection, str):
+        check_one_of(output.projection, PROJECTIONS, "[output] projection")
+    elif not any(output.projection):
+        raise RecipeError("[output] projection = [0, 0, 0] is no direction: give one towards the viewer")
+    check_one_of(output.align, ALIGNMENTS, "[output] align")
 
 
 def _check_length(described: Described, where: str) -> None:

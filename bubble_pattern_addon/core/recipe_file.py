@@ -15,6 +15,7 @@ from .metric import Constant, Described
 from .recipe import FILL, Recipe, Seed, rounded
 from .recipe_checks import check_choice, check_recipe
 from .toml_values import Point, flag, nearest, number, point, show, spell, text, texts, whole
+from .units import read_unit
 
 
 def load_toml(path: Path) -> dict[str, Any]:
@@ -101,7 +102,7 @@ def _refuse_unknown(data: Mapping[str, Any]) -> None:
 # -- readers: the right type or a RecipeError that names the key ---------------------------------------------
 
 
-def _orientation(value: object, where: str) -> str | Point:
+def _word_or_vector(value: object, where: str) -> str | Point:
     return point(value, where) if isinstance(value, list) else text(value, where)
 
 
@@ -141,7 +142,7 @@ READERS: dict[str, dict[str, Callable[[object, str], Any]]] = {
     "packing": {
         "pitch": field_from_toml,
         "edge_offset": number,
-        "orientation": _orientation,
+        "orientation": _word_or_vector,
         "integrator": text,
         "seed": whole,
         "iterations": whole,
@@ -159,7 +160,15 @@ READERS: dict[str, dict[str, Callable[[object, str], Any]]] = {
     },
     "feature": {"kind": text, "depth": number, "sides": whole, "tolerance": number},
     "limits": {"min_web": number, "min_margin": number, "min_diameter": number},
-    "output": {"blend": flag, "picture": flag, "formats": texts},
+    "output": {
+        "blend": flag,
+        "picture": flag,
+        "formats": texts,
+        "drawings": texts,
+        "projection": _word_or_vector,
+        "align": text,
+        "unit": read_unit,
+    },
 }
 
 

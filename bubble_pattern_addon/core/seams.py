@@ -20,6 +20,9 @@ from .region import Region
 
 # A loop whose turning is farther from an island's than this is an end of a tube.
 TUBE_END = np.pi / 2
+# Where faces bend by more than this, a cut is seen least: along there it counts as CREASED times as long.
+CREASE = np.radians(20.0)
+CREASED = 0.5
 # A corner with more angle missing (or too much) than this is reached by a cut, where corners are.
 SHARP = 0.2
 
@@ -76,7 +79,7 @@ def find_cuts(region: Region, all_the_way: bool = False) -> Bools:
 
     all_the_way: join every loop and reach every sharp corner, as unfolds a cone's frustum or a box
     """
-    edges = find_edges(region)
+    edges = _along_creases(region, find_edges(region))
     angle = corner_angles(region)
     count = int(edges.vertex.max()) + 1
     around = np.bincount(edges.vertex.ravel(), angle.ravel(), count)
@@ -98,7 +101,9 @@ def find_cuts(region: Region, all_the_way: bool = False) -> Bools:
     in_tree[before[before >= 0]] = True
     left = _left_over(region, edges, islands, in_tree, free, distance)
     targets = [edges.ends[left].ravel(), sharp, edges.ends[free, 0]]
-    closed_smooth = [v for v in farthest.tolist() if not np.isin(sharp, np.flatnonzero(sheet == sheet[v])).any()]
+    closed_smooth = [
+        v for v in farthest.tolist() if not np.isin(sharp, np.flatnonzero(sheet == sheet[v])).any()
+    ]
     targets.append(np.array(closed_smooth, dtype=np.int64))
     cut = left.copy()
     cut[_paths(np.concatenate(targets), edges, before)] = True
@@ -108,6 +113,14 @@ def find_cuts(region: Region, all_the_way: bool = False) -> Bools:
             cut[_paths(np.flatnonzero(sheet == sheet[v]), edges, before)] = True
     result: Bools = (cut & ~edges.rim)[edges.of]
     return result
+
+
+def _along_creases(region: Region, edges: Edges) -> Edges:
+    """The edges with those shorter along which the region bends."""
+    beside = region.neighbours[edges.row, edges.corner]
+    cosine = np.einsum("ec,ec->e", region.normals[edges.row], region.normals[beside])
+    creased = ~edges.rim & (cosine < np.cos(CREASE))
+    return replace(edges, length=np.where(creased, CREASED * edges.length, edges.length))
 
 
 def _merged(pairs: Ints, count: int) -> Ints:
@@ -150,9 +163,7 @@ def _loops(region: Region, edges: Edges, around: Floats, all_the_way: bool) -> t
     return islands, start[first[outer]]
 
 
-def _roots(
-    edges: Edges, sheet: Ints, outer: Ints, defect: Floats, count: int
-) -> tuple[Ints, Ints]:
+def _roots(edges: Edges, sheet: Ints, outer: Ints, defect: Floats, count: int) -> tuple[Ints, Ints]:
     """A vertex of every sheet to start from, and of every closed sheet the one farthest from there."""
     closed = np.setdiff1d(np.arange(sheet.max() + 1), sheet[outer])
     order = np.lexsort((np.arange(count), -np.round(defect, 9), sheet))
@@ -194,7 +205,9 @@ def _left_over(
     """
     crossed = np.flatnonzero(~in_tree & ~free)
     row, corner = edges.row[crossed], edges.corner[crossed]
-    over = np.where(islands[crossed] >= 0, len(region.triangles) + islands[crossed], region.neighbours[row, corner])
+    over = np.where(
+        islands[crossed] >= 0, len(region.triangles) + islands[crossed], region.neighbours[row, corner]
+    )
     total = len(region.triangles) + len(region.loops)
     # the shortest loops are to be left over
     worth = distance[edges.ends[crossed]].sum(axis=1) + edges.length[crossed]

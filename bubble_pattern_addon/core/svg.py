@@ -50,7 +50,11 @@ def _number(value: float) -> str:
 
 
 def _layers(drawing: Drawing) -> dict[str, Iterator[str]]:
-    layers = {"boundary": _paths(drawing.boundary), "features": _features(drawing), "centers": _marks(drawing)}
+    layers = {
+        "boundary": _paths(drawing.boundary),
+        "features": _features(drawing),
+        "centers": _marks(drawing),
+    }
     if drawing.cuts:
         layers["cuts"] = _paths(drawing.cuts)
     return layers
