@@ -32,14 +32,14 @@ from .core.pipeline import pattern_steps
 from .core.progress import Progress, Steps, drive, within
 from .core.recipe import Recipe, default_recipe
 from .core.recipe_file import load_recipe, recipe_to_toml
-from .core.recipe_units import recipe_in
+from .core.recipe_units import load_fitted_recipe
 from .core.region import Region, make_region
 from .core.selection import select, sub_regions
 from .core.sides import check_one_side
 from .core.solid import Part, part_steps
 from .core.soundness import sound_base
 from .core.surroundings import Surroundings
-from .core.units import millimetres_in, unit_of
+from .core.units import millimetres_in
 from .terminal import line_on, silenced
 
 EXAMPLE = """\
@@ -132,13 +132,11 @@ def run_steps(base: LoadedBase, recipe_file: Path) -> Steps[Run]:
 
 
 def recipe_for(base: LoadedBase, recipe_file: Path, region: Region | None = None) -> Recipe:
-    """The recipe in a file in the unit of the base, where both say theirs; filled up by what fits the region."""
-    given = load_recipe(recipe_file).output.unit
+    """The recipe in a file, in the unit of the base where both say theirs, with what it leaves out fitted to
+    the region.
+    """
     fitting = Recipe() if region is None else default_recipe(region.area, region.perimeter)
-    if given is None or base.millimetres is None:
-        return load_recipe(recipe_file, fitting)
-    unit = unit_of(base.millimetres)
-    return recipe_in(load_recipe(recipe_file, recipe_in(fitting, given, unit)), unit, given)
+    return load_fitted_recipe(recipe_file, fitting, base.millimetres)
 
 
 def draw(region: Region, pattern: Pattern, recipe: Recipe, millimetres: float) -> Drawing:

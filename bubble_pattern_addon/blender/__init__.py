@@ -2,9 +2,29 @@
 
 from __future__ import annotations
 
-from . import command, fixed_sizes, operators, panels, properties, versioning
+from . import (
+    command,
+    export_operator,
+    fixed_sizes,
+    operators,
+    panels,
+    presets,
+    properties,
+    recipe_operators,
+    versioning,
+)
 
-MODULES = (properties, operators, fixed_sizes, panels, versioning, command)
+MODULES = (
+    properties,
+    operators,
+    fixed_sizes,
+    recipe_operators,
+    export_operator,
+    presets,
+    panels,
+    versioning,
+    command,
+)
 
 
 def register() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from .recipe_operators import draw_files
 from .settings_recipe import is_outdated, length_text
 from .sidebar import SettingsPanel, sentences, shown_settings
 
@@ -51,6 +52,7 @@ class BUBBLE_PATTERN_PT_result(SettingsPanel, bpy.types.Panel):
             right = split.row()
             right.alert = alert
             right.label(text=figure)
+        draw_files(self.layout)
         if settings.notes:
             sentences(self.layout, settings.notes, context.region.width, 'INFO')
 

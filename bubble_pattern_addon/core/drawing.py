@@ -1,12 +1,13 @@
-"""Drawings of a pattern: laid flat and true to length, or projected along a direction; written by dxf and svg.
+"""Drawings of a pattern: laid flat and true to length, or projected along a direction.
 
-Features keep their true size when laid flat. Projected they look as they are seen: a round one that leans is an
-ellipse.
+Features keep their true size when laid flat. Projected they look as they are seen: a round one that leans is
+an ellipse.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -40,10 +41,12 @@ class Drawing:
     """A pattern in the plane, in millimetres, x to the right and y up, seen from outside.
 
     ids: (n,) of the features drawn; centre: (n, 2); diameter: (n,)
-    major: (n, 2) unit direction of the long axis of a round feature; ratio: (n,) of its short over its long one
+    major: (n, 2) unit direction of the long axis of a round feature; ratio: (n,) of its short over its long
+    one
     outlines: (n, k, 2) closed outlines of features that are not round; None: all are
     boundary: of the target region; cuts: where it was cut open to be laid flat, from both sides
-    stretch: the largest factor by which a length of the region is longer or shorter; nan where it is projected
+    stretch: the largest factor by which a length of the region is longer or shorter; nan where it is
+    projected
     hidden: how many features face away and are not drawn; across: how many reach over a cut
     """
 
@@ -119,8 +122,8 @@ def _mean_normal(region: Region) -> Floats:
 
 
 def view_axes(sight: Floats) -> tuple[Floats, Floats, Floats]:
-    """Unit vectors to the right, up and towards the viewer, as CAD views have them: z is up where it can be, y
-    where the paper is nearly square to z.
+    """Unit vectors to the right, up and towards the viewer, as CAD views have them: z is up where it can be,
+    y where the paper is nearly square to z.
     """
     sight = sight / np.linalg.norm(sight)
     up = np.array([0.0, 1.0, 0.0] if abs(sight[2]) > np.sqrt(0.5) else [0.0, 0.0, 1.0])
@@ -292,8 +295,8 @@ def _refuse_overlap(centre: Complex, pattern: Pattern) -> None:
     if (together & apart).any():
         x, y, z = pattern.position[one[together & apart][0]]
         raise RegionError(
-            f"The target region comes to lie over itself when it is laid flat (near {x:.4g}, {y:.4g}, {z:.4g}): "
-            "draw it projected, or divide it into smaller regions"
+            f"The target region comes to lie over itself when it is laid flat (near {x:.4g}, {y:.4g}, "
+            f"{z:.4g}): draw it projected, or divide it into smaller regions"
         )
 
 
@@ -345,7 +348,7 @@ def _runs(start: Floats, end: Floats, is_cut: Bools) -> list[tuple[bool, Line]]:
     order = np.roll(np.arange(len(start)), -changes[0])
     bounds = np.append(changes - changes[0], len(start))
     runs = []
-    for low, high in zip(bounds[:-1], bounds[1:], strict=True):
+    for low, high in pairwise(bounds.tolist()):
         these = order[low:high]
         points = np.concatenate([start[these], end[these[-1:]]])
         runs.append((bool(is_cut[these[0]]), Line(points, False)))

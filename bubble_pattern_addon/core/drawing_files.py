@@ -14,8 +14,8 @@ WRITERS = {".dxf": write_dxf, ".svg": write_svg}
 
 
 def write_drawing(path: Path, drawing: Drawing) -> None:
-    """The drawing in the format of the path's suffix (one of recipe.DRAWINGS). OSError where the file can't be
-    written.
+    """The drawing in the format of the path's suffix (one of recipe.DRAWINGS). OSError where the file can't
+    be written.
     """
     WRITERS[path.suffix.lower()](path, drawing)
 
@@ -23,9 +23,9 @@ def write_drawing(path: Path, drawing: Drawing) -> None:
 def drawing_report(drawing: Drawing | None) -> dict[str, Any]:
     """The entry "drawing" of a run's report, none without a drawing.
 
-    features: how many are drawn; hidden: how many face away; across_cuts: how many reach over a line where the
-    region was cut open; stretch: the largest factor between a length on the base and on paper, None where it
-    is projected
+    features: how many are drawn; hidden: how many face away; across_cuts: how many reach over a line where
+    the region was cut open; stretch: the largest factor between a length on the base and on paper, None
+    where it is projected
     """
     if drawing is None:
         return {}

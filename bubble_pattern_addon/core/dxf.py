@@ -1,7 +1,8 @@
-"""DXF, the exchange format of CAD and of laser and punching machines: a drawing as ASCII of AutoCAD 2000 (AC1015).
+"""DXF, the exchange format of CAD and of laser and punching machines: a drawing as ASCII of AutoCAD 2000
+(AC1015).
 
-After Autodesk's "DXF Reference": what a strict reader asks for, with handles and owners throughout, and nothing
-else. Round features are CIRCLE entities, those that lean ELLIPSE, others closed LWPOLYLINE.
+After Autodesk's "DXF Reference": what a strict reader asks for, with handles and owners throughout, and
+nothing else. Round features are CIRCLE entities, those that lean ELLIPSE, others closed LWPOLYLINE.
 """
 
 from __future__ import annotations

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import io
+import os
 import re
 import shutil
 import tempfile
@@ -202,6 +203,38 @@ def output_folder(target: Path) -> Iterator[Path]:
         for folder in reversed(made):
             with contextlib.suppress(OSError):
                 folder.rmdir()
+
+
+@contextlib.contextmanager
+def output_file(target: Path) -> Iterator[Path]:
+    """A working file beside `target`, with its suffix, that takes its place only when all went well.
+
+    Raises OutputError for a target that can't be written.
+    """
+    work: Path | None = None
+    try:
+        if target.is_dir():
+            raise OutputError(f"Output {target} is a folder: give a file")
+        if not target.parent.is_dir():
+            raise OutputError(f"Folder {target.parent} does not exist: choose another one")
+        handle, name = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent)
+        os.close(handle)
+        work = Path(name)
+        yield work
+        # a file made for us alone is for all whom the folder lets see
+        work.chmod(0o666 & ~_umask())
+        work.replace(target)
+    except OSError as error:
+        raise _in_words(error, target) from None
+    finally:
+        if work is not None:
+            work.unlink(missing_ok=True)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
 
 
 def _make_folders(folder: Path) -> list[Path]:

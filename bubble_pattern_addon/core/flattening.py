@@ -1,9 +1,9 @@
 """A region laid flat: true to length where it can be, else with the least distortion.
 
-A conformal map (B. Lévy and others, "Least squares conformal maps", 2002) lays a developable surface flat as it
-is; on any other it is where the search for the least stretch begins: each triangle is fitted by a rotation,
-then all are joined (L. Liu and others, "A local/global approach to mesh parameterization", 2008). In the plane
-a rotation is a complex number.
+A conformal map (B. Lévy and others, "Least squares conformal maps", 2002) lays a developable surface flat as
+it is; on any other it is where the search for the least stretch begins: each triangle is fitted by a
+rotation, then all are joined (L. Liu and others, "A local/global approach to mesh parameterization", 2008).
+In the plane a rotation is a complex number.
 """
 
 from __future__ import annotations
@@ -21,8 +21,10 @@ from .region import Region
 from .seams import corner_vertices, find_cuts
 from .surface import Complex, make_charts
 
-# Below this stretch no further cut is tried; another one is worth it where it takes away half of the stretch.
-GOOD = 1.01
+# A stretch below this is none. Further cuts are worth it where none is left with them, or where the stretch
+# is above MUCH and they take away half of it.
+TRUE = 1.001
+MUCH = 1.05
 ROUNDS = 200
 # Of the extent: the search rests where nothing moves more in a round.
 STILL = 1e-7
@@ -51,16 +53,17 @@ def flatten(region: Region) -> Flat:
     """
     local = make_charts(region).corners
     best = _flattened(region, local, find_cuts(region))
-    if best.stretch > GOOD:
+    if best.stretch > TRUE:
         cuts = find_cuts(region, all_the_way=True)
         if not np.array_equal(cuts, best.cuts):
             other = _flattened(region, local, cuts)
-            if other.stretch - 1 < (best.stretch - 1) / 2 or not np.isfinite(best.stretch):
+            much_less = best.stretch > MUCH and other.stretch - 1 < (best.stretch - 1) / 2
+            if other.stretch < TRUE or much_less:
                 best = other
     if not np.isfinite(best.stretch):
         raise RegionError(
-            "The target region is curved too much to be laid flat without folds: draw it projected, or divide "
-            "it into smaller regions"
+            "The target region is curved too much to be laid flat without folds: draw it projected, or "
+            "divide it into smaller regions"
         )
     return best
 
@@ -144,7 +147,9 @@ def _true_size(flat: Complex, local: Complex, vertex: Ints, part: Ints) -> Compl
 
 
 def _least_stretch(local: Complex, vertex: Ints, sheet: Ints, flat: Complex, extent: float) -> Complex:
-    """From `flat` (V,) towards the map whose triangles differ least from turned ones: as rigid as possible."""
+    """From `flat` (V,) towards the map whose triangles differ least from turned ones: as rigid as
+    possible.
+    """
     sides = _sides(local)
     area = _twice_area(local)
     dot = (np.roll(sides, -2, axis=1).conj() * np.roll(sides, -1, axis=1)).real

@@ -1,4 +1,4 @@
-"""A recipe seen from another frame: its points and directions after a rigid motion."""
+"""A recipe and a pattern seen from another frame: their points and directions after a rigid motion."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ import numpy as np
 
 from .blending import FaceSet
 from .mesh import Floats
-from .metric import Described
+from .metric import Described, Places
 from .painted import Image, mean_normal, upward
+from .pattern import Pattern
 from .recipe import Recipe
 from .region import Region
 from .toml_values import Point
@@ -45,6 +46,23 @@ def moved_recipe(recipe: Recipe, matrix: Floats, region: Region) -> Recipe:
         ),
         shaping=replace(shaping, diameter=moved(shaping.diameter, matrix, region), seeds=seeds),
         output=replace(recipe.output, projection=projection),
+    )
+
+
+def moved_pattern(pattern: Pattern, matrix: Floats, factor: float = 1.0) -> Pattern:
+    """`pattern` after the rigid motion `matrix` (4, 4), and then `factor` times as large."""
+    turn = matrix[:3, :3].T
+    places = pattern.places
+    position = (places.position @ turn + matrix[:3, 3]) * factor
+    return replace(
+        pattern,
+        places=Places(position, places.triangle, places.barycentric),
+        normal=pattern.normal @ turn,
+        tangent=pattern.tangent @ turn,
+        pitch=pattern.pitch * factor,
+        diameter=pattern.diameter * factor,
+        wished=None if pattern.wished is None else pattern.wished * factor,
+        dropped=None if pattern.dropped is None else moved_pattern(pattern.dropped, matrix, factor),
     )
 
 

@@ -124,8 +124,8 @@ class Output:
 
     formats: the part in these formats too (see FORMATS); blend: the base with the editable pattern as
     pattern.blend; picture: a rendered view of the part as part.png
-    drawings: of the pattern, in these formats (see DRAWINGS), as pattern.dxf and so on; projection, align: how
-    it is drawn, see drawing.make_drawing
+    drawings: of the pattern, in these formats (see DRAWINGS), as pattern.dxf and so on; projection, align:
+    how it is drawn, see drawing.make_drawing
     unit: that of the recipe's lengths (see core.units), and of the base where its file does not say; None:
     that of the base, or millimetres
     """

@@ -1,10 +1,10 @@
 """Where a region must be cut open before it can be laid flat.
 
-A region that is a disc, with islands or without, needs no cut. A tube is slit from end to end, a handle across
-and along, a closed surface from one end to the other; where that is not enough, every loop is joined and
-every sharp corner is reached. The cuts run along edges of the base, on shortest paths: a tree of shortest paths
-and a spanning tree of the dual graph that does not cross it, Erickson and Whittlesey, "Greedy optimal homotopy
-and homology generators", 2005.
+A region that is a disc, with islands or without, needs no cut. A tube is slit from end to end, a handle
+across and along, a closed surface from one end to the other; where that is not enough, every loop is joined
+and every sharp corner is reached. The cuts run along edges of the base, on shortest paths: a tree of
+shortest paths and a spanning tree of the dual graph that does not cross it, Erickson and Whittlesey, "Greedy
+optimal homotopy and homology generators", 2005.
 """
 
 from __future__ import annotations
@@ -140,8 +140,8 @@ def corner_angles(region: Region) -> Floats:
 
 
 def _loops(region: Region, edges: Edges, around: Floats, all_the_way: bool) -> tuple[Ints, Ints]:
-    """Number of the island that an edge borders on, -1 for none, (E,), and a vertex on the outer loop of every
-    sheet that has one.
+    """Number of the island that an edge borders on, -1 for none, (E,), and a vertex on the outer loop of
+    every sheet that has one.
 
     What the boundary turns through tells them apart (Gauss and Bonnet): 2 pi round a flat region, -2 pi round
     an island in it, nothing at the end of a tube.
@@ -164,13 +164,15 @@ def _loops(region: Region, edges: Edges, around: Floats, all_the_way: bool) -> t
 
 
 def _roots(edges: Edges, sheet: Ints, outer: Ints, defect: Floats, count: int) -> tuple[Ints, Ints]:
-    """A vertex of every sheet to start from, and of every closed sheet the one farthest from there."""
+    """A vertex of every sheet to start from, a sharp one where there are, and of every closed sheet the one
+    farthest from there."""
     closed = np.setdiff1d(np.arange(sheet.max() + 1), sheet[outer])
     order = np.lexsort((np.arange(count), -np.round(defect, 9), sheet))
     sharpest = order[np.diff(sheet[order], prepend=-1) != 0][closed]
     if not len(closed):
         return outer, closed
     ends = _farthest(edges, sharpest, sheet, closed, count)
+    ends = np.where(defect[sharpest] > SHARP, sharpest, ends)
     return np.concatenate([outer, ends]), _farthest(edges, ends, sheet, closed, count)
 
 

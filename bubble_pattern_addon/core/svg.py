@@ -20,8 +20,8 @@ MARK = 0.1
 
 
 def write_svg(path: Path, drawing: Drawing) -> None:
-    """Write the drawing; a unit is a millimetre, and x and y are the drawing's but for y pointing down. OSError
-    where the file can't be written.
+    """Write the drawing; a unit is a millimetre, and x and y are the drawing's but for y pointing down.
+    OSError where the file can't be written.
     """
     low, high = drawing.extent
     size = float((high - low).max())
@@ -35,7 +35,8 @@ def write_svg(path: Path, drawing: Drawing) -> None:
     )
     path.write_text(
         '<?xml version="1.0" encoding="UTF-8"?>\n'
-        '<svg xmlns="http://www.w3.org/2000/svg" xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape" '
+        '<svg xmlns="http://www.w3.org/2000/svg" '
+        'xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape" '
         f'version="1.1" width="{_number(width)}mm" height="{_number(height)}mm" '
         f'viewBox="{" ".join(_number(value) for value in box)}" fill="none" '
         f'stroke-width="{_number(max(STROKE * size, HAIRLINE))}">\n{groups}</svg>\n',
