@@ -12,7 +12,7 @@ from ..mesh import Floats
 from ..metric import Constant, Field, Places
 from ..progress import Progress, Steps, within
 from ..quality import measure_points
-from ..recipe import Packing
+from ..recipe import Packing, rounded
 from ..region import Region
 from ..surface import Charts, Complex, Spots, make_charts, positions, to_frame, walk
 from ..symmetry import find_symmetry
@@ -120,9 +120,10 @@ def _settled(
         yield Progress("Packing the bubbles", 0.2 + 0.2 * number)
         local = local_pitch(ground, bubbles)
         settle = relax if packing.integrator == "fire" else integrate
-        bubbles, _ = settle(
-            ground, bubbles, _filling(ground, bubbles, local), packing.iterations, packing.tolerance
-        )
+        # At one pitch everywhere, whoever comes or goes after the first round stirs but a few neighbours.
+        later = number > 0 and ground.uniform is not None
+        steps = max(packing.iterations // (2 if later else 1), 1)
+        bubbles, _ = settle(ground, bubbles, _filling(ground, bubbles, local), steps, packing.tolerance)
         bubbles, changed = control(ground, bubbles, local)
         if not changed:
             break
@@ -176,10 +177,12 @@ def _check_count(region: Region, pitch: Lengths) -> None:
     area = np.linalg.norm(region.area_vectors, axis=1) / 2
     count = float((area / (np.sqrt(0.75) * local**2)).sum())
     if count > MOST:
-        fitting = float(local.mean()) * np.sqrt(count / MOST)
+        mean = float(local.mean())
         raise RegionError(
-            f"A pitch of {local.mean():.4g} means about {count:,.0f} features in this region, more than "
-            f"{MOST:,}: use a pitch of at least {fitting:.3g}, or a smaller region."
+            f"A pitch of {{pitch}} means about {count:,.0f} features in this region, more than {MOST:,}: "
+            "use a pitch of at least {fitting}, or a smaller region",
+            pitch=rounded(mean),
+            fitting=float(f"{mean * np.sqrt(count / MOST):.3g}"),
         )
 
 
