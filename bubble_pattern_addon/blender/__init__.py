@@ -6,16 +6,22 @@ from . import (
     command,
     export_operator,
     fixed_sizes,
+    live,
     operators,
     panels,
     presets,
     properties,
     recipe_operators,
+    runs,
     versioning,
+    watching,
 )
 
 MODULES = (
     properties,
+    watching,
+    runs,
+    live,
     operators,
     fixed_sizes,
     recipe_operators,

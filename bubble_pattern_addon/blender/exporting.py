@@ -11,6 +11,7 @@ import numpy as np
 
 from ..core.drawing import make_drawing
 from ..core.drawing_files import write_drawing
+from ..core.drawn_shapes import drawn_shapes
 from ..core.errors import OutputError
 from ..core.export import write_features
 from ..core.files import METRE, output_file, write_mesh
@@ -20,12 +21,12 @@ from ..core.pattern import Pattern
 from ..core.recipe import DRAWINGS, FORMATS
 from ..core.region import Region
 from ..core.toml_values import Point
-from .generation import read_source
 from .pattern_object import read_pattern
 from .properties import in_scene
 from .reading import evaluated_mesh, read_base, shown, transformed
 from .recipe_exchange import recipe_to_share
 from .settings_recipe import is_outdated, recipe_of
+from .sources import read_source
 from .units import scene_millimetres
 
 # glTF is upright along y.
@@ -73,7 +74,8 @@ def export(
                 return f"table of {len(pattern):,} features"
 
         else:
-            drawing = make_drawing(region, pattern, projection, align, millimetres)
+            shapes = drawn_shapes(pattern, recipe_of(obj.bubble_pattern).feature)
+            drawing = make_drawing(region, pattern, projection, align, millimetres, shapes)
 
             def write(work: Path) -> str:
                 write_drawing(work, drawing)

@@ -43,9 +43,9 @@ def recipe_to_share(obj: bpy.types.Object, context: bpy.types.Context) -> str:
     recipe = recipe_of(settings)
     frame = world_frame(settings.base)
     if not np.array_equal(frame, np.eye(4)):
-        from . import generation
+        from .sources import read_source
 
-        region = generation.read_source(settings.base, settings.region, context, recipe).region
+        region = read_source(settings.base, settings.region, context, recipe).region
         recipe = moved_recipe(recipe, frame, region)
     millimetres = scene_millimetres(context.scene)
     unit = None if millimetres is None else unit_of(millimetres)
@@ -102,10 +102,11 @@ def adopt_steps(
     settings are as they were.
     """
     from . import generation
+    from .sources import read_source
 
     yield Progress("Reading the base", 0.0)
     settings = obj.bubble_pattern
-    source = generation.read_source(settings.base, settings.region, context)
+    source = read_source(settings.base, settings.region, context)
     recipe = _fitting(obj, context, tables, source.region, whole)
     check_number(recipe, source.region)
     before = _present(settings)

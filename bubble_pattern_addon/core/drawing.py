@@ -97,11 +97,12 @@ def make_drawing(
     projection: "flat", laid flat, its lower left corner at 0; "normal", projected along the region's mean
     normal; or a direction towards the viewer. align: the drawing is upright as the "base" stands (z is up, or
     y where z is square to the paper), or its x axis runs along the "rows". millimetres: in a unit of the base
-    shapes: what the features look like; None: circles square to the surface
+    shapes: what the features look like; None: circles square to their axes
 
     Raises RegionError where the region can't be laid flat, or faces all ways.
     """
-    shapes = Shapes(pattern.normal, pattern.tangent) if shapes is None else shapes
+    if shapes is None:
+        shapes = Shapes(axes_of(pattern), headings_of(pattern))
     if not isinstance(projection, str):
         drawing = _projected(region, pattern, np.array(projection, dtype=np.float64), align, shapes)
     elif projection == "normal":
@@ -109,6 +110,16 @@ def make_drawing(
     else:
         drawing = _laid_flat(region, pattern, align, shapes)
     return _scaled(drawing, millimetres)
+
+
+def axes_of(pattern: Pattern) -> Floats:
+    """The directions in which the features stand, (n, 3)."""
+    return pattern.normal if pattern.axis is None else pattern.axis
+
+
+def headings_of(pattern: Pattern) -> Floats:
+    """The features' x axes, (n, 3)."""
+    return pattern.tangent if pattern.heading is None else pattern.heading
 
 
 def _mean_normal(region: Region) -> Floats:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .blending import FaceSet
+from .feature_recipe import Feature
 from .mesh import Floats
 from .metric import Described, Places
 from .painted import Image, mean_normal, upward
@@ -45,6 +46,7 @@ def moved_recipe(recipe: Recipe, matrix: Floats, region: Region) -> Recipe:
             symmetry_centre=None if centre is None else _moved_point(centre, matrix),
         ),
         shaping=replace(shaping, diameter=moved(shaping.diameter, matrix, region), seeds=seeds),
+        feature=moved_feature(recipe.feature, matrix, region),
         output=replace(recipe.output, projection=projection),
     )
 
@@ -62,7 +64,24 @@ def moved_pattern(pattern: Pattern, matrix: Floats, factor: float = 1.0) -> Patt
         pitch=pattern.pitch * factor,
         diameter=pattern.diameter * factor,
         wished=None if pattern.wished is None else pattern.wished * factor,
+        axis=None if pattern.axis is None else pattern.axis @ turn,
+        heading=None if pattern.heading is None else pattern.heading @ turn,
+        sizes={
+            name: values * factor if name in ("depth", "height") else values
+            for name, values in pattern.sizes.items()
+        },
         dropped=None if pattern.dropped is None else moved_pattern(pattern.dropped, matrix, factor),
+    )
+
+
+def moved_feature(feature: Feature, matrix: Floats, region: Region) -> Feature:
+    """The feature after the motion of everything."""
+    pull, heads, point = feature.pull, feature.turn_direction, feature.turn_point
+    return replace(
+        feature.with_fields(lambda field: moved(field, matrix, region)),
+        pull=None if pull is None else _turned(pull, matrix),
+        turn_direction=None if heads is None else _turned(heads, matrix),
+        turn_point=None if point is None else _moved_point(point, matrix),
     )
 
 

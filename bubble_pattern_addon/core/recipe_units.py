@@ -22,7 +22,7 @@ LENGTHS = {
     "region": ("near", "gap"),
     "packing": ("pitch", "edge_offset", "symmetry_centre"),
     "shaping": ("diameter", "seeds"),
-    "feature": ("depth", "tolerance"),
+    "feature": ("depth", "height", "tolerance", "rim_size", "turn_point"),
     "limits": ("min_web", "min_margin", "min_diameter"),
     "output": (),
 }

@@ -13,7 +13,9 @@ import trimesh
 
 from bubble_pattern_addon.core.drawing import Drawing, Shapes, make_drawing, view_axes
 from bubble_pattern_addon.core.drawing_files import drawing_report, write_drawing
+from bubble_pattern_addon.core.drawn_shapes import drawn_shapes
 from bubble_pattern_addon.core.errors import RegionError
+from bubble_pattern_addon.core.feature_recipe import Feature
 from bubble_pattern_addon.core.mesh import Floats, Mesh
 from bubble_pattern_addon.core.metric import Constant
 from bubble_pattern_addon.core.pattern import Pattern
@@ -359,3 +361,48 @@ def test_the_places_of_features_do_not_depend_on_where_the_part_is(dome: tuple[R
     places = replace(pattern.places, position=pattern.position + shift)
     one, two = make_drawing(region, pattern), make_drawing(there, replace(pattern, places=places))
     assert one.centre == pytest.approx(two.centre, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "feature",
+    [
+        Feature(profile="slot", aspect=0.3),
+        Feature(profile="cross", rounding=0.5, turn="fixed", turn_direction=(1.0, 0.0, 0.0), angle=20.0),
+        Feature(kind="bump", form="boss", profile="polygon", corners=5, draft=10.0),
+    ],
+)
+def test_profiles_are_drawn_as_they_are_cut(plate: tuple[Region, Pattern], feature: Feature) -> None:
+    region, _ = plate
+    recipe = Recipe(
+        packing=Packing(pitch=Constant(2.4)), shaping=Shaping(diameter=Constant(1.5)), feature=feature
+    )
+    pattern = drive(pattern_steps(region, recipe))
+    shapes = drawn_shapes(pattern, feature)
+    drawing = make_drawing(region, pattern, shapes=shapes)
+    assert drawing.outlines is not None
+    # no outline leaves its circle, and each touches it
+    reach = np.linalg.norm(drawing.outlines - drawing.centre[:, None], axis=2)
+    assert reach.max(axis=1) == pytest.approx(np.full(len(pattern), 0.75))
+    # it heads where the feature does: the same as seen along the normal of this flat region
+    seen = make_drawing(region, pattern, "normal", shapes=shapes)
+    was, is_ = (one.outlines.reshape(-1, 2) @ [1, 1j] for one in (seen, drawing))
+    motion = np.polyfit(was, is_, 1)  # a rotation and a shift take one drawing to the other
+    assert abs(motion[0]) == pytest.approx(1)
+    assert np.abs(np.polyval(motion, was) - is_).max() < 1e-6
+
+
+def test_a_circle_or_a_mesh_is_drawn_as_a_circle(plate: tuple[Region, Pattern]) -> None:
+    _, pattern = plate
+    for feature in (Feature(), Feature(rim="chamfer"), Feature(profile="mesh", mesh="star")):
+        assert drawn_shapes(pattern, feature).outlines is None
+
+
+def test_an_axis_other_than_the_normal_decides_how_a_circle_is_seen(dome: tuple[Region, Pattern]) -> None:
+    region, _ = dome
+    feature = Feature(axis=1.0, pull=(0.0, 0.0, 1.0))
+    recipe = Recipe(
+        packing=Packing(pitch=Constant(2.0)), shaping=Shaping(diameter=Constant(1.2)), feature=feature
+    )
+    pattern = drive(pattern_steps(region, recipe))
+    drawing = make_drawing(region, pattern, (0.0, 0.0, 1.0), shapes=drawn_shapes(pattern, feature))
+    assert drawing.ratio == pytest.approx(1)

@@ -27,7 +27,9 @@ PURE = {
     "region": {"max_angle"},
     "packing": {"orientation", "tolerance"},
     "shaping": {"tolerance"},
-    "feature": set(),
+    "feature": {
+        *("draft", "rim_angle", "aspect", "rounding", "points", "axis", "pull", "turn_direction", "angle"),
+    },
     "limits": set(),
     "output": {"projection", "unit"},
 }
