@@ -150,7 +150,7 @@ def make_region(base: Mesh, selected: Bools, parts: Ints | None = None, gap: flo
         own = parts[triangles]
         shared = (neighbours >= 0) & (own[neighbours] != own[:, None])
         neighbours, opposite = np.where(shared, -1, neighbours), np.where(shared, -1, opposite)
-    loops, rim = _boundary_loops(rows, neighbours, opposite)
+    loops, rim = boundary_loops(rows, neighbours, opposite)
     reserve = np.where(shared[rim[:, 0], rim[:, 1]], gap / 2, 0.0)
     return Region(welded, triangles, neighbours, opposite, _sheets(neighbours), loops, rim, reserve)
 
@@ -217,7 +217,7 @@ def _sheets(neighbours: Ints) -> Ints:
     return connected_components(links, directed=False)[1].astype(np.int64)
 
 
-def _boundary_loops(rows: Ints, neighbours: Ints, opposite: Ints) -> tuple[tuple[Ints, ...], Ints]:
+def boundary_loops(rows: Ints, neighbours: Ints, opposite: Ints) -> tuple[tuple[Ints, ...], Ints]:
     """Boundary edges chained into loops: vertex rows per loop, and all edges as (row, opposite corner) in
     loop order.
     """
