@@ -2,9 +2,41 @@
 
 from __future__ import annotations
 
-from . import command, fixed_sizes, operators, panels, properties, versioning
+from . import (
+    command,
+    export_operator,
+    fixed_sizes,
+    live,
+    offenders,
+    operators,
+    overlay,
+    panels,
+    presets,
+    properties,
+    recipe_operators,
+    runs,
+    solving,
+    versioning,
+    watching,
+)
 
-MODULES = (properties, operators, fixed_sizes, panels, versioning, command)
+MODULES = (
+    properties,
+    watching,
+    runs,
+    live,
+    operators,
+    fixed_sizes,
+    solving,
+    offenders,
+    recipe_operators,
+    export_operator,
+    presets,
+    panels,
+    versioning,
+    overlay,
+    command,
+)
 
 
 def register() -> None:

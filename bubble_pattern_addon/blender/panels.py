@@ -6,16 +6,33 @@ from typing import Any
 
 import bpy
 
-from . import feature_panel, limits_panel, packing_panel, region_panel, result_panel, shaping_panel
+from . import (
+    feature_panel,
+    limits_panel,
+    live,
+    packing_panel,
+    region_panel,
+    result_panel,
+    runs,
+    shaping_panel,
+)
+from .presets import BUBBLE_PATTERN_PT_presets
 from .properties import in_scene, is_pattern, pattern_objects, pattern_of
+from .recipe_operators import draw_files
 from .settings_recipe import is_outdated
 from .sidebar import SidebarPanel, is_applied, large, sentences
+from .stepping import draw_progress
 
 
 class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
     """Region, and the buttons."""
 
     bl_label = "Bubble Pattern"
+
+    def draw_header_preset(self, context: bpy.types.Context) -> None:
+        """Blender's menu of presets, where there is a pattern to lay by one."""
+        if pattern_of(context.active_object) is not None:
+            BUBBLE_PATTERN_PT_presets.draw_panel_header(self.layout)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, active = self.layout, context.active_object
@@ -56,7 +73,11 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
             layout.prop(base.bubble_pattern, "pattern", text="")
         else:
             layout.label(text=obj.name, icon='MOD_PARTICLE_INSTANCE')
-        outdated = bool(settings.trouble) or is_outdated(settings)
+        trouble = settings.trouble or live.trouble_of(obj)
+        outdated = bool(trouble) or is_outdated(settings)
+        run = runs.under_way()
+        if run is not None:
+            draw_progress(layout, run)
         if is_pattern(context.active_object) and context.mode == 'EDIT_MESH':
             self.draw_points(layout, settings)
             return
@@ -70,8 +91,8 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
             row.operator("bubble_pattern.region_edit", icon='FACESEL')
             if not outdated:
                 row.operator("bubble_pattern.update", icon='FILE_REFRESH')
-        if settings.trouble:
-            sentences(layout, settings.trouble, context.region.width, 'ERROR')
+        if trouble:
+            sentences(layout, trouble, context.region.width, 'ERROR')
         if outdated:
             large(layout).operator("bubble_pattern.update", icon='FILE_REFRESH', depress=True)
         (layout.row() if outdated or editing else large(layout)).operator(
@@ -98,6 +119,7 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
         else:
             layout.label(text=f"{settings.count:,} holes, watertight", icon='CHECKMARK')
         large(layout).operator("bubble_pattern.edit", icon='GREASEPENCIL')
+        draw_files(layout)
         layout.operator("bubble_pattern.remove", icon='TRASH')
 
 

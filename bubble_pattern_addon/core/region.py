@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from .boxtree import BoxTree, build_tree
 from .errors import RegionError
 from .mesh import Bools, Floats, Ints, Mesh
+
+if TYPE_CHECKING:
+    from .surface import Charts
 
 # A triangle is flat when its height is below this share of its longest edge: walking over it would divide by
 # zero.
@@ -49,6 +54,13 @@ class Region:
     def corners(self) -> Floats:
         """Corner positions of the region's triangles, (R, 3, 3)."""
         return self.base.vertices[self.base.triangles[self.triangles]]
+
+    @cached_property
+    def charts(self) -> Charts:
+        """Frames of the triangles."""
+        from .surface import make_charts  # which knows regions
+
+        return make_charts(self)
 
     @cached_property
     def area_vectors(self) -> Floats:
@@ -104,6 +116,11 @@ class Region:
         return self.corners[row[:, None], ends]
 
     @cached_property
+    def tree(self) -> BoxTree:
+        """Boxes round the triangles of the whole base."""
+        return build_tree(self.base.columns)
+
+    @cached_property
     def perimeter(self) -> float:
         """Length of all boundary loops together."""
         start, end = self.boundary_segments.swapaxes(0, 1)
@@ -133,7 +150,7 @@ def make_region(base: Mesh, selected: Bools, parts: Ints | None = None, gap: flo
         own = parts[triangles]
         shared = (neighbours >= 0) & (own[neighbours] != own[:, None])
         neighbours, opposite = np.where(shared, -1, neighbours), np.where(shared, -1, opposite)
-    loops, rim = _boundary_loops(rows, neighbours, opposite)
+    loops, rim = boundary_loops(rows, neighbours, opposite)
     reserve = np.where(shared[rim[:, 0], rim[:, 1]], gap / 2, 0.0)
     return Region(welded, triangles, neighbours, opposite, _sheets(neighbours), loops, rim, reserve)
 
@@ -200,7 +217,7 @@ def _sheets(neighbours: Ints) -> Ints:
     return connected_components(links, directed=False)[1].astype(np.int64)
 
 
-def _boundary_loops(rows: Ints, neighbours: Ints, opposite: Ints) -> tuple[tuple[Ints, ...], Ints]:
+def boundary_loops(rows: Ints, neighbours: Ints, opposite: Ints) -> tuple[tuple[Ints, ...], Ints]:
     """Boundary edges chained into loops: vertex rows per loop, and all edges as (row, opposite corner) in
     loop order.
     """
