@@ -24,18 +24,19 @@ from .core.errors import BaseError, FieldError, OutputError, PatternError
 from .core.export import make_report, write_features, write_report
 from .core.field_tables import Wanted, wanted, with_images
 from .core.files import LoadedBase, load_base, output_folder, write_mesh
+from .core.keep_out import region_with_keep_outs
 from .core.mesh import Bools, Floats
 from .core.pattern import Pattern
 from .core.pipeline import pattern_steps
 from .core.progress import Progress, Steps, drive, within
-from .core.recipe import Recipe, default_recipe
+from .core.recipe import KeepOut, Recipe, RegionChoice, default_recipe
 from .core.recipe_file import load_recipe, recipe_to_toml
-from .core.region import Region, make_region
+from .core.region import Region
 from .core.selection import select, sub_regions
 from .core.sides import check_one_side
 from .core.solid import Part, part_steps
 from .core.soundness import sound_base
-from .core.surroundings import Surroundings
+from .core.surroundings import Solid, Solids, Surroundings
 from .terminal import line_on, silenced
 
 EXAMPLE = """\
@@ -73,9 +74,9 @@ class Run:
 class BlenderSide(Protocol):
     """What `blender.batch_base` does for a batch run."""
 
-    def read_base(self, path: Path | None, names: Wanted) -> LoadedBase:
-        """The base in a .blend file, in world coordinates, with what `names` asks for; None: in the file that
-        is open.
+    def read_base(self, path: Path | None, names: Wanted, keep_outs: Sequence[KeepOut]) -> LoadedBase:
+        """The base in a .blend file, in world coordinates, with what `names` and `keep_outs` ask for; None:
+        in the file that is open.
         """
         ...
 
@@ -105,7 +106,9 @@ def run_steps(base: LoadedBase, recipe_file: Path) -> Steps[Run]:
     choice = load_recipe(recipe_file).region
     selected = select(base.mesh, choice, base.attributes, base.materials)
     parts = sub_regions(choice, base.attributes, base.materials)
-    region = make_region(base.mesh, selected, parts, choice.gap)
+    masks = {**base.materials, **base.attributes}
+    solids = {**base.solids, **read_solids(choice, recipe_file.parent)}
+    region = region_with_keep_outs(base.mesh, selected, parts, choice.gap, choice.keep_out, masks, solids)
     recipe = load_recipe(recipe_file, default_recipe(region.area, region.perimeter))
     sound_base(base.mesh)  # step 3 looks again; but nobody shall wait for a packing to be told of a hole
     if recipe.feature.depth is None:
@@ -119,6 +122,13 @@ def run_steps(base: LoadedBase, recipe_file: Path) -> Steps[Run]:
     if part.check.problems:
         raise BaseError(f"The part is not good: {' '.join(part.check.problems)}")
     return Run(recipe, base, selected, region, pattern, part, report, recipe_file.parent)
+
+
+def read_solids(choice: RegionChoice, folder: Path) -> Solids:
+    """The mesh files that the keep-outs name, seen from `folder`. BaseError where one cannot be read."""
+    names = {keep_out.file for keep_out in choice.keep_out if keep_out.file is not None}
+    upright = np.array([0.0, 0.0, 1.0])
+    return {("file", name): [Solid(load_base(folder / name).mesh, upright)] for name in sorted(names)}
 
 
 def read_images(recipe: Recipe, folder: Path) -> dict[str, Floats]:
@@ -186,7 +196,7 @@ def write_run(run: Run, folder: Path, blender: Callable[[], BlenderSide]) -> Non
         write_mesh(folder / f"part.{name}", run.part.mesh)
     write_features(folder / "features.csv", run.pattern)
     write_report(folder / "report.json", run.report)
-    recipe = with_copied_images(run, folder)
+    recipe = with_copied_files(run, folder)
     (folder / "recipe.toml").write_text(recipe_to_toml(recipe), encoding="utf-8")
     if run.recipe.output.blend:
         blender().write_blend(folder / "pattern.blend", run)
@@ -194,16 +204,26 @@ def write_run(run: Run, folder: Path, blender: Callable[[], BlenderSide]) -> Non
         blender().write_picture(folder / "part.png", run)
 
 
-def with_copied_images(run: Run, folder: Path) -> Recipe:
-    """The recipe with the image files that it names copied beside it: there it makes the same part."""
+def with_copied_files(run: Run, folder: Path) -> Recipe:
+    """The recipe with the image and mesh files that it names copied beside it: there it makes the same
+    part.
+    """
     packing, shaping = run.recipe.packing, run.recipe.shaping
     names: dict[str, str] = {}
     for number, name in enumerate(sorted(wanted(packing.pitch, shaping.diameter).images), 1):
         if (run.origin / name).is_file():  # else it is in the .blend
             names[name] = f"image_{number}{Path(name).suffix}"
             shutil.copyfile(run.origin / name, folder / names[name])
+    choice, entries = run.recipe.region, []
+    for number, entry in enumerate(choice.keep_out, 1):
+        copied = entry.file
+        if copied is not None:
+            copied = f"keep_out_{number}{Path(copied).suffix}"
+            shutil.copyfile(run.origin / str(entry.file), folder / copied)
+        entries.append(replace(entry, file=copied))
     return replace(
         run.recipe,
+        region=replace(choice, keep_out=tuple(entries)),
         packing=replace(packing, pitch=with_images(packing.pitch, names)),
         shaping=replace(shaping, diameter=with_images(shaping.diameter, names)),
     )
@@ -251,16 +271,18 @@ def parse(arguments: Sequence[str], prog: str) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def read_base(path: Path | None, in_blender: bool, names: Wanted) -> LoadedBase:
-    """The base that the command line names, with what `names` asks for; None is the file open in Blender."""
+def read_base(path: Path | None, in_blender: bool, names: Wanted, keep_outs: Sequence[KeepOut]) -> LoadedBase:
+    """The base that the command line names, with what `names` and `keep_outs` ask for; None is the file open
+    in Blender.
+    """
     if path is None:
         if not in_blender:
             raise BaseError("No base is given: add --base MODEL")
-        return blender_side().read_base(None, names)
+        return blender_side().read_base(None, names, keep_outs)
     if path.suffix.lower() == ".blend":
         if not path.exists():
             raise BaseError(f"Base {path} does not exist: check the path")
-        return blender_side().read_base(path, names)
+        return blender_side().read_base(path, names, keep_outs)
     return load_base(path)
 
 
@@ -284,7 +306,7 @@ def main(
         recipe = load_recipe(options.recipe)  # nonsense is told before a long read
         with hushed():
             names = wanted(recipe.packing.pitch, recipe.shaping.diameter)
-            base = read_base(options.base, in_blender, names)
+            base = read_base(options.base, in_blender, names, recipe.region.keep_out)
         with output_folder(options.out) as folder:
             run = drive(run_steps(base, options.recipe), show)
             with hushed():

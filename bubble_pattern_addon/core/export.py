@@ -54,9 +54,9 @@ def make_report(region: Region, pattern: Pattern, part: Part, seconds: Mapping[s
 
     features, watertight, genus, volume, open_area, min_web, min_margin, quality{six, psi6, gap_cv, gap_min,
     rim_cv} and seconds{region, pack, shape, add}; further symmetry, the recipe's word for the one that the
-    pattern has, or "off", wall{min, max}, the near wall's thickness at the
-    features, limits (see limits_report), problems, one sentence each, empty when the part is good, and notes,
-    likewise, on what does no harm.
+    pattern has, or "off", kept_out_area, what keep-outs have taken from the region, wall{min, max}, the near
+    wall's thickness at the features, limits (see limits_report), problems, one sentence each, empty when the
+    part is good, and notes, likewise, on what does no harm.
     """
     figures: Quality = measure(pattern, region)
     thickness = part.thickness[np.isfinite(part.thickness)]
@@ -69,6 +69,7 @@ def make_report(region: Region, pattern: Pattern, part: Part, seconds: Mapping[s
         "volume": part.check.volume,
         "removed_volume": part.check.removed_volume,
         "region_area": region.area,
+        "kept_out_area": region.kept_out,
         "open_area": open_area(pattern, region),
         "min_web": min_web(pattern),
         "min_margin": min_margin(pattern, region),

@@ -20,7 +20,7 @@ from .errors import BaseError, OutputError
 from .mesh import Bools, Floats, Mesh
 from .paint import painted
 from .region import weld
-from .surroundings import Thing
+from .surroundings import Solids, Thing
 from .threemf import Piece, read_3mf, write_3mf
 
 SUFFIXES = (".stl", ".obj", ".ply", ".3mf", ".glb", ".gltf")
@@ -35,7 +35,7 @@ class LoadedBase:
     attributes, materials: name -> mask (T,) of the triangles that carry it
     values: name -> what is painted on the base, (T,) on faces, (T, 3) or (T, 3, channels) at corners
     uv_maps: name -> (T, 3, 2)
-    objects: name -> what stands beside the base
+    objects: name -> what stands beside the base; solids: bodies there that keep-outs name
     """
 
     mesh: Mesh
@@ -44,6 +44,7 @@ class LoadedBase:
     values: Mapping[str, Floats] = field(default_factory=dict, kw_only=True)
     uv_maps: Mapping[str, Floats] = field(default_factory=dict, kw_only=True)
     objects: Mapping[str, Thing] = field(default_factory=dict, kw_only=True)
+    solids: Solids = field(default_factory=dict, kw_only=True)
 
 
 # -- in ------------------------------------------------------------------------------------------------------

@@ -11,14 +11,14 @@ from scipy.sparse.csgraph import dijkstra
 from .errors import RegionError
 from .links import Links, find_links
 from .mesh import Floats, Ints
-from .metric import Bound, Constant, Field, Places
+from .metric import Bound, Constant, Field
 from .packing.pack import local_pitch, pack_steps
 from .pattern import Pattern
 from .progress import Progress, Steps
 from .recipe import Recipe
 from .region import Region
 from .shaping import bound, shaped
-from .surface import Charts, Spots, positions, smooth_normals, to_frame, to_space
+from .surface import Charts, Spots, on_base, smooth_normals, to_frame, to_space
 from .surroundings import NOTHING, Surroundings
 
 
@@ -42,8 +42,8 @@ def pattern_steps(region: Region, recipe: Recipe, surroundings: Surroundings = N
     if bubbles.partners is not None:
         # Partners are alike also where the metric is so only within the tolerance.
         pitch = pitch[bubbles.partners].min(axis=1)
-    points = positions(ground.charts, spots)
-    places = Places(points, region.triangles[spots.row], spots.barycentric)
+    places = on_base(region, spots)
+    points = places.position
     links = find_links(ground.charts, points, spots.row, pitch)
     normal = smooth_normals(region, spots)
     packed = Pattern(
@@ -53,7 +53,7 @@ def pattern_steps(region: Region, recipe: Recipe, surroundings: Surroundings = N
         pitch=pitch,
         diameter=np.zeros(len(pitch)),
         row=_rows(links, len(pitch), bubbles.fixed),
-        packing_notes=ground.notes,
+        packing_notes=(*region.notes, *ground.notes),
         symmetry=None if ground.symmetry is None else ground.symmetry.group.word,
         partners=bubbles.partners,
     )
@@ -63,7 +63,7 @@ def pattern_steps(region: Region, recipe: Recipe, surroundings: Surroundings = N
 def _check_lengths(region: Region, field: Field, name: str) -> None:
     """RegionError where a field is no positive length at some corner of the region's triangles."""
     corners = np.tile(np.eye(3), (len(region.triangles), 1))
-    places = Places(region.corners.reshape(-1, 3), np.repeat(region.triangles, 3), corners)
+    places = on_base(region, Spots(np.repeat(np.arange(len(region.triangles)), 3), corners))
     values = field(places)
     bad = ~(np.isfinite(values) & (values > 0))
     if bad.any():

@@ -27,11 +27,39 @@ NEAT = (1, 1.1, 1.2, 1.4, 1.6, 1.8, 2, 2.2, 2.5, 2.8, 3, 3.5, 4, 4.5, 5, 5.5, 6,
 
 
 @dataclass(frozen=True)
+class KeepOut:
+    """What the pattern goes round: faces (a face attribute or material), bodies or a shape (exactly one).
+
+    object, collection: of the .blend; file: a mesh file, seen from the recipe's folder
+    sphere, cylinder, box: its centre; the first two have a diameter, a box its size along its three axes
+    axis: the third axis of a cylinder or box, by default z; bodies are seen along it, by default along their
+    own Z axis; along: where the first axis of a box points, by default x or as near to it as can be
+    reach: how far along its axis beyond its own ends it counts; None: without end
+    margin: what stays free round it
+    """
+
+    faces: str | None = None
+    object: str | None = None
+    collection: str | None = None
+    file: str | None = None
+    sphere: Point | None = None
+    cylinder: Point | None = None
+    box: Point | None = None
+    diameter: float | None = None
+    size: Point | None = None
+    axis: Point | None = None
+    along: Point | None = None
+    reach: float | None = None
+    margin: float = 0.0
+
+
+@dataclass(frozen=True)
 class RegionChoice:
     """Which faces of the base are the target region: exactly one of near, attribute, material and all.
 
     parts: face attributes or materials whose faces are sub-regions with a first row of their own along their
     border (what none of them names is one more); gap: what stays free between neighbouring sub-regions
+    keep_out: what is taken out of it again (see core.keep_out)
     """
 
     near: Point | None = None
@@ -41,6 +69,7 @@ class RegionChoice:
     all: bool = False
     parts: tuple[str, ...] = ()
     gap: float = 0.0
+    keep_out: tuple[KeepOut, ...] = ()
 
 
 @dataclass(frozen=True)

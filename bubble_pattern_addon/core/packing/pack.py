@@ -9,12 +9,12 @@ import numpy as np
 from ..boundary import make_boundary, nearest_boundary, signature
 from ..errors import RegionError
 from ..mesh import Floats
-from ..metric import Constant, Field, Places
+from ..metric import Constant, Field
 from ..progress import Progress, Steps, within
 from ..quality import measure_points
 from ..recipe import Packing
 from ..region import Region
-from ..surface import Charts, Complex, Spots, make_charts, positions, to_frame, walk
+from ..surface import Charts, Complex, Spots, make_charts, on_base, positions, to_frame, walk
 from ..symmetry import find_symmetry
 from .bubbles import Bubbles, Ground, can_move, joined
 from .crowding import close_pairs, uncrowded
@@ -161,8 +161,7 @@ def local_pitch(ground: Ground, bubbles: Bubbles) -> Floats:
 
 def _pitch_over(region: Region, field: Field) -> Lengths:
     def pitch(spots: Spots) -> Floats:
-        points = np.einsum("nk,nkc->nc", spots.barycentric, region.corners[spots.row])
-        return field(Places(points, region.triangles[spots.row], spots.barycentric))
+        return field(on_base(region, spots))
 
     return pitch
 
