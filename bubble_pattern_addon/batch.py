@@ -23,20 +23,20 @@ import numpy as np
 from .core.errors import BaseError, FieldError, OutputError, PatternError
 from .core.export import make_report, write_features, write_report
 from .core.field_tables import Wanted, wanted, with_images
-from .core.files import LoadedBase, load_base, output_folder, write_mesh
+from .core.files import LoadedBase, load_base, load_solids, output_folder, write_mesh
 from .core.keep_out import region_with_keep_outs
 from .core.mesh import Bools, Floats
 from .core.pattern import Pattern
 from .core.pipeline import pattern_steps
 from .core.progress import Progress, Steps, drive, within
-from .core.recipe import KeepOut, Recipe, RegionChoice, default_recipe
+from .core.recipe import KeepOut, Recipe, default_recipe
 from .core.recipe_file import load_recipe, recipe_to_toml
 from .core.region import Region
 from .core.selection import select, sub_regions
 from .core.sides import check_one_side
 from .core.solid import Part, part_steps
 from .core.soundness import sound_base
-from .core.surroundings import Solid, Solids, Surroundings
+from .core.surroundings import Surroundings
 from .terminal import line_on, silenced
 
 EXAMPLE = """\
@@ -107,7 +107,8 @@ def run_steps(base: LoadedBase, recipe_file: Path) -> Steps[Run]:
     selected = select(base.mesh, choice, base.attributes, base.materials)
     parts = sub_regions(choice, base.attributes, base.materials)
     masks = {**base.materials, **base.attributes}
-    solids = {**base.solids, **read_solids(choice, recipe_file.parent)}
+    files = [keep_out.file for keep_out in choice.keep_out if keep_out.file is not None]
+    solids = {**base.solids, **load_solids(files, recipe_file.parent)}
     region = region_with_keep_outs(base.mesh, selected, parts, choice.gap, choice.keep_out, masks, solids)
     recipe = load_recipe(recipe_file, default_recipe(region.area, region.perimeter))
     sound_base(base.mesh)  # step 3 looks again; but nobody shall wait for a packing to be told of a hole
@@ -122,13 +123,6 @@ def run_steps(base: LoadedBase, recipe_file: Path) -> Steps[Run]:
     if part.check.problems:
         raise BaseError(f"The part is not good: {' '.join(part.check.problems)}")
     return Run(recipe, base, selected, region, pattern, part, report, recipe_file.parent)
-
-
-def read_solids(choice: RegionChoice, folder: Path) -> Solids:
-    """The mesh files that the keep-outs name, seen from `folder`. BaseError where one cannot be read."""
-    names = {keep_out.file for keep_out in choice.keep_out if keep_out.file is not None}
-    upright = np.array([0.0, 0.0, 1.0])
-    return {("file", name): [Solid(load_base(folder / name).mesh, upright)] for name in sorted(names)}
 
 
 def read_images(recipe: Recipe, folder: Path) -> dict[str, Floats]:

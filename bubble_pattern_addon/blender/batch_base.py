@@ -7,7 +7,7 @@ writes.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,16 +18,17 @@ import numpy as np
 
 from ..core.errors import BaseError, OutputError
 from ..core.field_tables import NO_NAMES, Wanted, wanted, with_images
-from ..core.files import LoadedBase
+from ..core.files import LoadedBase, load_solids
 from ..core.mesh import Bools, Floats, Mesh
 from ..core.metric import Places
 from ..core.moving import moved_recipe
 from ..core.pattern import Pattern
 from ..core.quality import measure
-from ..core.recipe import Recipe
+from ..core.recipe import KeepOut, Recipe
 from .applying import place_part, verdict_of
 from .attributes import CORNER_VERTEX, MATERIAL, write_values
 from .generation import fill_settings, measured, put, read_source
+from .keep_outs import read_solids
 from .marked_side import on_marked_side
 from .part_mesh import build_part_mesh
 from .pattern_object import new_pattern_object
@@ -75,9 +76,9 @@ def registered() -> Iterator[None]:
 # -- in ------------------------------------------------------------------------------------------------------
 
 
-def read_base(path: Path | None, names: Wanted = NO_NAMES) -> LoadedBase:
+def read_base(path: Path | None, names: Wanted = NO_NAMES, keep_outs: Sequence[KeepOut] = ()) -> LoadedBase:
     """The base in a .blend file, with its modifiers and in world coordinates, and of what is painted on it or
-    stands beside it what `names` asks for; None: in the file that is open.
+    stands beside it what `names` and `keep_outs` ask for; None: in the file that is open.
 
     Raises BaseError where the file is no .blend, or which of its objects is meant cannot be told.
     """
@@ -93,6 +94,7 @@ def read_base(path: Path | None, names: Wanted = NO_NAMES) -> LoadedBase:
             base = read_object(obj, mesh, WORLD)
             painted = read_painted(obj, mesh, base, replace(names, images=frozenset()))
         around = with_things(painted, names, WORLD, bpy.context)
+        solids = read_solids([entry for entry in keep_outs if entry.file is None], WORLD, bpy.context)
         marks = {name: on_marked_side(obj, base, name, mask) for name, mask in base.attributes.items()}
     return BlendBase(
         base.mesh,
@@ -102,6 +104,7 @@ def read_base(path: Path | None, names: Wanted = NO_NAMES) -> LoadedBase:
         values=around.attributes,
         uv_maps=around.uv_maps,
         objects=around.objects,
+        solids=solids,
     )
 
 
@@ -140,7 +143,7 @@ def write_blend(path: Path, run: Run) -> None:
             mark(base_obj, region, base, run.selected)
         pattern_obj = new_pattern_object(base_obj)
         to_frame = np.linalg.inv(world_frame(base_obj))
-        fill_settings(pattern_obj, base_obj, region, moved_recipe(with_images_in(run), to_frame, run.region))
+        fill_settings(pattern_obj, base_obj, region, moved_recipe(with_files_in(run), to_frame, run.region))
         recipe = recipe_of(pattern_obj.bubble_pattern)
         source = read_source(base_obj, region, bpy.context, recipe)
         start = time.perf_counter()
@@ -156,8 +159,10 @@ def write_blend(path: Path, run: Run) -> None:
             raise OutputError(f"{path.name} can't be written: {str(error).removeprefix('Error: ')}") from None
 
 
-def with_images_in(run: Run) -> Recipe:
-    """The recipe with the image files that it names taken into the open file, under names that fit there."""
+def with_files_in(run: Run) -> Recipe:
+    """The recipe with the image and mesh files that it names taken into the open file, under names that fit
+    there.
+    """
     packing, shaping = run.recipe.packing, run.recipe.shaping
     names: dict[str, str] = {}
     for name in sorted(wanted(packing.pitch, shaping.diameter).images):
@@ -167,11 +172,26 @@ def with_images_in(run: Run) -> Recipe:
             image.pack()
             image.use_fake_user = True  # a field that is kept as text does not hold it
             names[name] = image.name
+    choice = run.recipe.region
     return replace(
         run.recipe,
+        region=replace(choice, keep_out=tuple(with_object(entry, run) for entry in choice.keep_out)),
         packing=replace(packing, pitch=with_images(packing.pitch, names)),
         shaping=replace(shaping, diameter=with_images(shaping.diameter, names)),
     )
+
+
+def with_object(keep_out: KeepOut, run: Run) -> KeepOut:
+    """The keep-out with the mesh file that it names as a hidden object of the open file."""
+    if keep_out.file is None:
+        return keep_out
+    [solid] = load_solids([keep_out.file], run.origin)["file", keep_out.file]
+    obj = bpy.data.objects.new(Path(keep_out.file).stem, mesh_of(solid.mesh))
+    bpy.context.scene.collection.objects.link(obj)
+    obj.hide_render = True
+    bpy.context.view_layer.update()
+    obj.hide_set(True)
+    return replace(keep_out, file=None, object=obj.name)
 
 
 def write_picture(path: Path, run: Run, size: tuple[int, int] = SIZE, up: Floats | None = None) -> None:

@@ -23,10 +23,11 @@ from ..core.progress import Progress, Steps, drive
 from ..core.quality import Quality, measure, min_margin, min_web, open_area
 from ..core.recipe import Recipe, RegionChoice, default_recipe
 from ..core.recipe_file import recipe_from_dict
-from ..core.region import Region, make_region
+from ..core.region import Region
 from ..core.selection import select, sub_regions
 from ..core.shaping import reshaped
 from ..core.surroundings import Surroundings
+from .keep_outs import cut_to_choice
 from .marked_side import on_marked_side
 from .pattern_object import read_pattern, write_pattern, write_sizes
 from .preview_nodes import show_preview
@@ -83,12 +84,13 @@ def read_source(
     selected = select(base.mesh, RegionChoice(attribute=attribute), base.attributes)
     selected = on_marked_side(obj, base, attribute, selected)
     parts = sub_regions(choice, base.attributes, base.materials)
+    region, fingerprint = cut_to_choice(base, selected, parts, choice, context)
     return Source(
         base,
-        make_region(base.mesh, selected, parts, choice.gap),
+        region,
         selected,
         surroundings,
-        base.fingerprint(selected, parts) + trace(surroundings, pitch_names),
+        fingerprint + trace(surroundings, pitch_names),
         trace(surroundings, size_names),
     )
 

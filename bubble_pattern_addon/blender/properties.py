@@ -10,6 +10,7 @@ from bpy.props import BoolProperty, PointerProperty
 
 from .feature_properties import FeatureSettings
 from .field_properties import BubblePatternField
+from .keep_out_properties import BubblePatternKeepOut
 from .limit_properties import LimitSettings
 from .packing_properties import PackingSettings
 from .reacting import redraw_preview
@@ -18,7 +19,7 @@ from .result_properties import ResultSettings
 from .shaping_properties import BubblePatternSeed, ShapingSettings
 
 # Raised when a property changes its meaning; see upgrade.
-SETTINGS_VERSION = 2
+SETTINGS_VERSION = 3
 
 
 def is_on(settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
@@ -97,7 +98,7 @@ def pattern_of(obj: bpy.types.Object | None) -> bpy.types.Object | None:
     return on_base[0] if on_base else None
 
 
-CLASSES = (BubblePatternField, BubblePatternSeed, BubblePatternSettings)
+CLASSES = (BubblePatternField, BubblePatternKeepOut, BubblePatternSeed, BubblePatternSettings)
 _register, _unregister = bpy.utils.register_classes_factory(CLASSES)
 
 

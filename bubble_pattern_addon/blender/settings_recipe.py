@@ -12,10 +12,11 @@ from ..core.blending import Fill
 from ..core.errors import PatternError, RecipeError
 from ..core.metric import Constant, Described
 from ..core.recipe import Feature, Limits, Packing, Recipe, RegionChoice, Seed, Shaping
-from ..core.recipe_checks import check_recipe
+from ..core.recipe_checks import check_keep_outs, check_recipe
 from ..core.recipe_file import recipe_to_toml
 from .field_properties import point_of, typed
 from .field_recipe import described, take
+from .keep_out_properties import is_given, keep_out_of, take_keep_out
 from .properties import BubblePatternSettings
 
 
@@ -27,6 +28,7 @@ def recipe_of(settings: Any) -> Recipe:
             attribute=settings.region or None,
             parts=(parts := tuple(name.strip() for name in settings.parts.split(",") if name.strip())),
             gap=typed(settings.gap) if parts else 0.0,
+            keep_out=tuple(keep_out_of(entry) for entry in settings.keep_out if is_given(entry)),
         ),
         packing=Packing(
             pitch=described(settings.pitch_field, settings.pitch, False, "[packing] pitch"),
@@ -61,6 +63,7 @@ def recipe_of(settings: Any) -> Recipe:
             min_diameter=typed(settings.min_diameter),
         ),
     )
+    check_keep_outs(recipe.region)
     check_recipe(recipe)
     return recipe
 
@@ -77,6 +80,9 @@ def take_recipe(settings: Any, recipe: Recipe) -> None:
     live, settings.live = settings.live, False  # one change after the other would lay a pattern each time
     settings.parts = ", ".join(recipe.region.parts)
     settings.gap = recipe.region.gap
+    settings.keep_out.clear()
+    for keep_out in recipe.region.keep_out:
+        take_keep_out(settings.keep_out.add(), keep_out)
     take_packing(settings, recipe.packing)
     take_shaping(settings, recipe.shaping)
     feature = recipe.feature

@@ -8,7 +8,7 @@ import io
 import re
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from .errors import BaseError, OutputError
 from .mesh import Bools, Floats, Mesh
 from .paint import painted
 from .region import weld
-from .surroundings import Solids, Thing
+from .surroundings import Solid, Solids, Thing
 from .threemf import Piece, read_3mf, write_3mf
 
 SUFFIXES = (".stl", ".obj", ".ply", ".3mf", ".glb", ".gltf")
@@ -80,6 +80,12 @@ def load_base(path: Path) -> LoadedBase:
     masks = {name: column != 0 for name, column in values.items() if column.ndim == 1}
     uv_maps = _laid_end_to_end([piece.uv_maps for piece in pieces], pieces)
     return LoadedBase(weld(mesh), masks, materials, values=values, uv_maps=uv_maps)
+
+
+def load_solids(names: Iterable[str], folder: Path) -> Solids:
+    """The bodies in mesh files, named as seen from `folder`, upright. BaseError as load_base."""
+    upright = np.array([0.0, 0.0, 1.0])
+    return {("file", name): [Solid(load_base(folder / name).mesh, upright)] for name in sorted(set(names))}
 
 
 def _read(path: Path) -> list[Piece]:

@@ -168,7 +168,7 @@ def footprints_of(keep_out: KeepOut, solids: Solids) -> list[Footprint]:
         across = lambda flat: np.hypot(flat[:, 0], flat[:, 1]) - radius  # noqa: E731
         return [shadow.footprint(across, keep_out.margin, 2 * radius, "a cylinder")]
     if keep_out.box is not None:
-        assert keep_out.size is not None  # check_keep_out has seen to it
+        assert keep_out.size is not None  # check_keep_outs has seen to it
         width, depth, height = keep_out.size
         half = np.array([width, depth]) / 2
         frame = frame_along(upright, None if keep_out.along is None else np.array(keep_out.along))
@@ -184,7 +184,7 @@ def footprints_of(keep_out: KeepOut, solids: Solids) -> list[Footprint]:
 
 
 def _diameter(keep_out: KeepOut) -> float:
-    assert keep_out.diameter is not None  # check_keep_out has seen to it
+    assert keep_out.diameter is not None  # check_keep_outs has seen to it
     return keep_out.diameter
 
 

@@ -45,11 +45,16 @@ def check_choice(choice: RegionChoice) -> None:
     check_at_least(choice.gap, 0, "[region] gap")
     if choice.gap and not choice.parts:
         raise RecipeError("[region] gap goes between parts: name these too, or leave gap out")
+    check_keep_outs(choice)
+
+
+def check_keep_outs(choice: RegionChoice) -> None:
+    """RecipeError unless every keep-out is one thing with what that needs."""
     for count, keep_out in enumerate(choice.keep_out, 1):
-        check_keep_out(keep_out, f"[region] keep_out, entry {count}")
+        _check_keep_out(keep_out, f"[region] keep_out, entry {count}")
 
 
-def check_keep_out(keep_out: KeepOut, where: str) -> None:
+def _check_keep_out(keep_out: KeepOut, where: str) -> None:
     """RecipeError, which names the entry by `where`, unless it is one thing with what that needs."""
     named = [key for key in KEEP_OUT_NEEDS if getattr(keep_out, key) is not None]
     if len(named) != 1:
