@@ -17,6 +17,8 @@ from .mesh import Bools, Floats, Ints, Mesh
 FLAT = 1e-12
 # Faces that turn by no more than this, in radians, lie in one plane: as much as single precision costs.
 LEVEL = 1e-4
+# Sheets whose normals have a cosine below this face away from each other.
+BACK_TO_BACK = -0.5
 
 
 @dataclass(frozen=True)
@@ -86,6 +88,16 @@ class Region:
         mean = self.area_vectors.sum(axis=0)
         length = np.linalg.norm(mean)
         return bool(self.sheet.max() == 0 and length > 0 and (self.normals @ mean).min() > 0.7 * length)
+
+    def same_side(self, row: Ints, other: Ints) -> Bools:
+        """Whether what is close in space on the triangles `row` and `other` (m,) is so on the surface too:
+        both are on one piece and face within 120 degrees of each other. Round an edge they do, on the two
+        sides of a wall they do not.
+        """
+        if self.single_sheet:
+            return np.ones(len(row), dtype=bool)
+        cosine = np.einsum("mc,mc->m", self.normals[row], self.normals[other])
+        return (cosine > BACK_TO_BACK) & (self.sheet[row] == self.sheet[other])
 
     @cached_property
     def flat(self) -> bool:

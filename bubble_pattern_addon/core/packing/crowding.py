@@ -10,7 +10,8 @@ from ..mesh import Bools, Floats, Ints
 
 def close_pairs(at: Floats, distance: Floats) -> Ints:
     """Pairs (m, 2) of the points `at` (n, k) that are closer than the mean of their `distance` (n,)."""
-    tree = cKDTree(at, balanced_tree=False, compact_nodes=False)
+    # Searched for by the first three coordinates alone, which is quicker; the others tell sheets apart.
+    tree = cKDTree(at[:, :3], balanced_tree=False, compact_nodes=False)
     pairs = tree.query_pairs(float(distance.max(initial=0.0)), output_type="ndarray")
     away = at[pairs[:, 0]] - at[pairs[:, 1]]
     return pairs[np.einsum("mk,mk->m", away, away) < distance[pairs].mean(axis=1) ** 2]

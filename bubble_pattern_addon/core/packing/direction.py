@@ -13,8 +13,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import coo_array, csr_array, diags_array
 
-from ..mesh import Bools, Floats
-from ..surface import Charts, Complex
+from ..mesh import Bools, Floats, Ints
+from ..surface import Charts, Complex, product
 
 # Diffusion per round as a share of the area, falling: far misfits first, near ones after.
 SPREAD = (0.003, 0.0005)
@@ -53,25 +53,25 @@ def smooth_directions(charts: Charts, chosen: Bools) -> Complex:
     # Far misfits meet as well between patches of triangles, which are few; the triangles finish it.
     patches, coarse, share = [], laplacian, area
     while coarse.shape[0] > ENOUGH:
-        patch = _paired(coarse)
-        patches.append(patch)
-        coarse, share = (patch.conj().T @ coarse @ patch).tocsr(), abs(patch).T @ share
+        patch, turn = _paired(coarse)
+        patches.append((patch, turn))
+        coarse, share = _merged(coarse, patch, turn), np.bincount(patch, share)
     # The frames' own directions, which are at odds: from a smooth start, such as one direction of space seen
     # on the surface, the misfits that belong to it never part.
     value = np.ones(coarse.shape[0], dtype=np.complex128)
     for spread in SPREAD:
         value = _diffused(coarse, share, value, spread, ROUNDS)
-    for patch in reversed(patches):
-        value = patch @ value
+    for patch, turn in reversed(patches):
+        value = product(value[patch], turn)
     if patches:
-        value = _diffused(laplacian, area, value, SPREAD[-1], LAST_ROUNDS)
+        value = _evened(laplacian, value, LAST_ROUNDS)
     result[members] = value
     return result
 
 
-def _paired(laplacian: csr_array) -> csr_array:
-    """Matrix (n, m) that gives each of n patches the value of the larger one it is a part of, turned into its
-    own frame: patches that have each other for best neighbour are joined in pairs.
+def _paired(laplacian: csr_array) -> tuple[Ints, Complex]:
+    """The larger patch (n,) that each of n patches is a part of, and the turn (n,) that brings its value into
+    the small one's own frame: patches that have each other for best neighbour are joined in pairs.
     """
     n = laplacian.shape[0]
     row = np.repeat(np.arange(n), np.diff(laplacian.indptr))
@@ -81,17 +81,36 @@ def _paired(laplacian: csr_array) -> csr_array:
     # Links of equal weight are told apart by an even scatter, else few are each other's best.
     low, high = np.minimum(row, column).astype(np.float64), np.maximum(row, column)
     weight = np.abs(link) * (1 + 0.3 * np.modf(low * 0.6180339887 + high * 0.4142135624)[0])
-    order = np.lexsort((weight, row))
-    last = np.flatnonzero(np.append(np.diff(row[order]) != 0, True))
+    begins = np.flatnonzero(np.append(True, np.diff(row) != 0)[: len(row)])
+    heaviest = np.full(n, -1.0)
+    heaviest[row[begins]] = np.maximum.reduceat(weight, begins) if len(row) else weight
+    first = np.flatnonzero(weight == heaviest[row])[::-1]
     best, turn = np.full(n, -1), np.ones(n, dtype=np.complex128)
-    best[row[order[last]]] = column[order[last]]
-    turn[row[order[last]]] = -link[order[last]] / np.abs(link[order[last]])
+    best[row[first]] = column[first]
+    turn[row[first]] = -link[first] / np.abs(link[first])
     number = np.arange(n)
     mutual = (best >= 0) & (best[best] == number)
     follows = mutual & (best < number)
     leader = np.where(follows, best, number)
     place = np.cumsum(~follows) - 1
-    return csr_array((np.where(follows, turn, 1.0), (number, place[leader])))
+    return place[leader], np.where(follows, turn, 1.0)
+
+
+def _merged(laplacian: csr_array, patch: Ints, turn: Complex) -> csr_array:
+    """The Laplacian of larger patches, as their parts' links add up to."""
+    row, column = np.repeat(np.arange(len(patch)), np.diff(laplacian.indptr)), laplacian.indices
+    link = product(product(laplacian.data, turn.conj()[row]), turn[column])
+    n = int(patch.max()) + 1
+    return coo_array((link, (patch[row], patch[column])), shape=(n, n)).tocsr()
+
+
+def _evened(laplacian: csr_array, value: Complex, rounds: int) -> Complex:
+    """Unit values, each `rounds` times the mean of its own and its neighbours'."""
+    own = 1 / laplacian.diagonal().real
+    for _ in range(rounds):
+        value = value - 0.5 * own * (laplacian @ value)
+        value = value / np.maximum(np.abs(value), 1e-300)
+    return value
 
 
 def _diffused(laplacian: csr_array, area: Floats, value: Complex, spread: float, rounds: int) -> Complex:

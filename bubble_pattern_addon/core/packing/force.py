@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..boundary import signature
 from ..mesh import Floats, Ints
 from ..surface import Charts
 
@@ -20,8 +19,9 @@ STIFFNESS = 12.0
 EVEN = 0.985
 # Bubbles whose pitches differ by no more than this factor are of one size class.
 CLASS = 1.35
-# No bubble feels more others than this: on a crowded spot a dozen have room within 1.66 pitches.
-MOST_NEAR = 20
+# No bubble has more others near: on a crowded spot a dozen have room within 1.66 pitches, and as many on the
+# other side of a thin wall.
+MOST_NEAR = 28
 
 
 Law = Callable[[Floats], Floats]
@@ -60,22 +60,23 @@ def find_pairs(charts: Charts, points: Floats, row: Ints, pitch: Floats, skin: f
 
     points: (n, 3) positions; row: (n,) region rows; pitch: (n,)
     """
+    region, reach = charts.region, REACH + skin
     least, most = float(pitch.min(initial=np.inf)), float(pitch.max(initial=0.0))
-    at, reach = signature(charts.region, points, row, most), REACH + skin
     if most < CLASS * least:
-        tree = cKDTree(at, balanced_tree=False, compact_nodes=False)
+        tree = cKDTree(points, balanced_tree=False, compact_nodes=False)
         first, second = tree.query_pairs(reach * most, output_type="ndarray").T
-        if most == least and charts.region.single_sheet:
-            # what the tree found is near enough
+        if most == least and region.single_sheet:
+            # all that the tree finds are near enough
             return Pairs(first, second, np.full(len(first), most))
     else:
         # Bubbles are searched for in classes of like size, so that small ones among large list no hundreds.
         size = np.floor(np.log(pitch / pitch.min()) / np.log(CLASS)).astype(np.int64)
-        found = [_pairs_of_class(at, pitch, size, number, reach) for number in np.unique(size)]
+        found = [_pairs_of_class(points, pitch, size, number, reach) for number in np.unique(size)]
         first, second = np.concatenate(found, axis=1)
     stable = (pitch[first] + pitch[second]) / 2
     away = points[first] - points[second]
     close = np.einsum("mc,mc->m", away, away) < (reach * stable) ** 2
+    close &= region.same_side(row[first], row[second])
     return Pairs(first[close], second[close], stable[close])
 
 
@@ -100,9 +101,10 @@ def renewed_pairs(
     moved = np.zeros(n, dtype=bool)
     moved[stale] = True
     kept = ~(moved[pairs.first] | moved[pairs.second])
-    at, reach = signature(charts.region, points, row, float(pitch.max())), REACH + skin
-    tree = cKDTree(at, balanced_tree=False, compact_nodes=False)
-    first, second = _nearest_pairs(tree, at, stale, pitch, reach)
+    tree = cKDTree(points, balanced_tree=False, compact_nodes=False)
+    first, second = _nearest_pairs(tree, points, stale, pitch, REACH + skin)
+    same = charts.region.same_side(row[first], row[second])
+    first, second = first[same], second[same]
     stable = (pitch[first] + pitch[second]) / 2
     return Pairs(
         np.concatenate([pairs.first[kept], first]),

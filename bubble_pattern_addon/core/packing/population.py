@@ -55,7 +55,7 @@ def control(ground: Ground, bubbles: Bubbles, pitch: Floats) -> tuple[Bubbles, i
     gone = pressed_out(ground, bubbles, pitch)
     most = CROWDED if ground.uniform is not None else CROWDED_GRADED
     gone[m:] |= _too_crowded(pairs, distance / pairs.stable, ratio[:n], owner, m, most)
-    added = _voids(ground, points, row, everywhere, np.flatnonzero(ratio < LONELY))
+    added = _voids(ground, points, row, everywhere, np.flatnonzero(ratio < LONELY), pairs)
     if not gone.any() and not len(added.row):
         return bubbles, 0
     if ground.symmetry is None:
@@ -109,9 +109,9 @@ def _too_crowded(pairs: Pairs, relative: Floats, ratio: Floats, owner: Ints, m: 
     return (crowded & kept)[m:]
 
 
-def _voids(ground: Ground, points: Floats, row: Ints, pitch: Floats, lonely: Ints) -> Spots:
+def _voids(ground: Ground, points: Floats, row: Ints, pitch: Floats, lonely: Ints, pairs: Pairs) -> Spots:
     """Places for new bubbles: centres of empty circles through three of the `lonely` bubbles, as local
-    Delaunay has them.
+    Delaunay has them. `pairs` are those of all bubbles.
     """
     region, charts = ground.charts.region, ground.charts
     nothing = Spots(np.empty(0, dtype=np.int64), np.empty((0, 3)))
@@ -126,6 +126,7 @@ def _voids(ground: Ground, points: Floats, row: Ints, pitch: Floats, lonely: Int
     centre, radius = _circumcircles(at[triple])
     mean = local[triple].mean(axis=1)
     wide = (radius > VOID * mean) & (radius < 1.3 * mean)
+    wide[wide] = ~_taken(points, pairs, lonely[triple[wide]], centre[wide], 0.7 * radius[wide])
     triple, centre, radius, mean = triple[wide], centre[wide], radius[wide], mean[wide]
     corner = lonely[triple[:, 0]]
     start = _spots_of(charts, points[corner], row[corner])
@@ -142,6 +143,24 @@ def _voids(ground: Ground, points: Floats, row: Ints, pitch: Floats, lonely: Int
     where = signature(region, positions(charts, arrived), arrived.row, reach)
     rank = np.lexsort((np.arange(len(mean)), -radius / mean)).argsort()
     return arrived.take(uncrowded(close_pairs(where, 0.9 * mean), rank))
+
+
+def _taken(points: Floats, pairs: Pairs, triple: Ints, centre: Floats, radius: Floats) -> Bools:
+    """Whether a neighbour of the three bubbles (m, 3) is nearer to the `centre` (m, 3) than `radius` (m,).
+
+    A look in space that settles most cases, before the centre has been brought onto the surface.
+    """
+    n = len(points)
+    own, other = np.concatenate([pairs[:2], pairs[1::-1]], axis=1)
+    link = csr_array((np.ones(len(own), dtype=np.int8), (own, other)), shape=(n, n))
+    asked = triple.ravel()
+    degree = np.diff(link.indptr)[asked]
+    begins = link.indptr[asked] - (np.cumsum(degree) - degree)
+    neighbour = link.indices[np.arange(degree.sum()) + np.repeat(begins, degree)]
+    circle = np.repeat(np.arange(len(asked)) // 3, degree)
+    away = points[neighbour] - centre[circle]
+    within = np.einsum("mc,mc->m", away, away) < radius[circle] ** 2
+    return np.bincount(circle[within], minlength=len(triple)) > 0
 
 
 def _spots_of(charts: Charts, points: Floats, row: Ints) -> Spots:
@@ -181,9 +200,10 @@ def _circumcircles(corners: Floats) -> tuple[Floats, Floats]:
 
 
 def _empty(ground: Ground, spots: Spots, at: Floats, points: Floats, row: Ints, radius: Floats) -> Bools:
-    """Whether no bubble is within `radius` of the places."""
-    region = ground.charts.region
+    """Whether no bubble of the same side of the surface is within `radius` of the places."""
     reach = float(radius.max(initial=0.0))
-    tree = cKDTree(signature(region, points, row, reach))
-    distance, _ = tree.query(signature(region, at, spots.row, reach))
-    return distance > radius
+    places = cKDTree(at)
+    near = places.sparse_distance_matrix(cKDTree(points), reach, output_type="ndarray")
+    place, other, distance = near["i"], near["j"], near["v"]
+    taken = (distance <= radius[place]) & ground.charts.region.same_side(spots.row[place], row[other])
+    return np.bincount(place[taken], minlength=len(at)) == 0

@@ -23,9 +23,10 @@ from .orbits import HALO, Followers, followers_of, held
 SKIN = 0.16
 # Where fewer bubbles are at work, telling some apart from the others costs more than it spares.
 FEW = 3000
-# How far bubbles may move between two landings, in pitches: from AFLOAT at first, less where a landing shifts
-# one by more than OFF, more (but never over FARTHEST) where it shifts all by less than a quarter of that.
-AFLOAT, FARTHEST = 0.1, 0.4
+# How far bubbles may move between two landings, in pitches: AFLOAT at first, then so far that by what they
+# were off the surface until now (which grows with the square of the way) none will be by more than OFF, but
+# no less than NEAREST and no more than FARTHEST.
+AFLOAT, NEAREST, FARTHEST = 0.1, 0.06, 0.4
 OFF = 0.01
 
 
@@ -182,29 +183,41 @@ def pull_on(swarm: Swarm, links: Links, law: Law) -> Floats:
 
 def move(swarm: Swarm, links: Links, steps: Floats, longest: float) -> None:
     """Move the active bubbles by `steps` (a, 3) in their pitches, none longer than `longest`."""
-    if swarm.drift + longest > swarm.afloat:
-        land(swarm, links.active)
+    if swarm.drift + longest > swarm.afloat and not swarm.ground.charts.region.flat:
+        _land_the_far(swarm, links)
     swarm.drift += longest
     swarm.strayed += longest
     swarm.points[links.active] += steps * links.pitch
     follow(swarm)
 
 
-def land(swarm: Swarm, active: Ints) -> None:
-    """Bring the active bubbles, who alone have moved, back onto the surface."""
+def _land_the_far(swarm: Swarm, links: Links) -> None:
+    """Bring those back onto the surface that have left it by more than half of what is allowed: most swing to
+    and fro, and few are as far away as their steps add up to.
+    """
+    away = swarm.points[links.active] - swarm.landed[links.active]
+    away /= links.pitch
+    square = np.einsum("ac,ac->a", away, away)
+    far = square > (swarm.afloat / 2) ** 2
+    drift = float(np.sqrt(square[~far].max(initial=0.0)))
+    off = land(swarm, links.active[far]) / links.pitch[far, 0]
+    swarm.drift = drift
+    if len(off):
+        rise = float((off / square[far]).max())
+        swarm.afloat = min(max(float(np.sqrt(OFF / max(rise, 1e-300))), NEAREST), FARTHEST)
+
+
+def land(swarm: Swarm, which: Ints) -> Floats:
+    """Bring the bubbles `which` back onto the surface, so that none is off it; how far they were, (n,)."""
     swarm.drift = 0.0
     # In a plane the way does not matter, only where it ends.
-    if swarm.ground.charts.region.flat:
-        return
-    before = swarm.points[active]
-    _walk_there(swarm, active)
+    if swarm.ground.charts.region.flat or not len(which):
+        return np.zeros(len(which))
+    before = swarm.points[which]
+    _walk_there(swarm, which)
+    off = np.linalg.norm(swarm.points[which] - before, axis=1)
     follow(swarm)
-    shift = swarm.points[active] - before
-    off = np.sqrt((np.einsum("ac,ac->a", shift, shift) / swarm.pitch[active] ** 2).max(initial=0.0))
-    if off > OFF:
-        swarm.afloat *= 0.5
-    elif off < OFF / 4:
-        swarm.afloat = min(1.5 * swarm.afloat, FARTHEST)
+    return off
 
 
 def _walk_there(swarm: Swarm, which: Ints) -> None:
