@@ -32,12 +32,15 @@ def moved_recipe(recipe: Recipe, matrix: Floats, region: Region) -> Recipe:
     if not isinstance(orientation, str):
         orientation = _turned(orientation, matrix)
     keep_outs = tuple(_moved_keep_out(keep_out, matrix) for keep_out in choice.keep_out)
+    pins = tuple(_moved_point(pin, matrix) for pin in packing.pins)
     near = None if choice.near is None else _moved_point(choice.near, matrix)
     seeds = tuple(replace(seed, at=_moved_point(seed.at, matrix)) for seed in shaping.seeds)
     return replace(
         recipe,
         region=replace(choice, near=near, keep_out=keep_outs),
-        packing=replace(packing, pitch=moved(packing.pitch, matrix, region), orientation=orientation),
+        packing=replace(
+            packing, pitch=moved(packing.pitch, matrix, region), orientation=orientation, pins=pins
+        ),
         shaping=replace(shaping, diameter=moved(shaping.diameter, matrix, region), seeds=seeds),
     )
 

@@ -81,6 +81,7 @@ class Packing:
     symmetry: "off"; "auto", whichever the region has; "x", "xy" and so on, mirrored at planes square to these
     axes of the base; "rotate 3" or "rotate 3 z", turned into itself by thirds about an axis (see
     core.isometries); symmetry_centre: a point of the planes or the axis, None for the region's own middle
+    pins: where bubbles stay whatever becomes of the others
     """
 
     pitch: Described = Constant(3.0)
@@ -92,6 +93,7 @@ class Packing:
     tolerance: float = 1e-3
     symmetry: str = OFF
     symmetry_centre: Point | None = None
+    pins: tuple[Point, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -103,6 +103,9 @@ def check_recipe(recipe: Recipe) -> None:
     check_symmetry(packing.symmetry, "[packing] symmetry")
     for coordinate in packing.symmetry_centre or ():
         check_finite(coordinate, "[packing] symmetry_centre")
+    for pin in packing.pins:
+        for coordinate in pin:
+            check_finite(coordinate, "[packing] pins")
     check_one_of(feature.kind, KINDS, "[feature] kind")
     if feature.depth is not None:
         check_above(feature.depth, "[feature] depth")

@@ -14,7 +14,7 @@ from .field_tables import field_from_toml, field_to_toml
 from .metric import Constant, Described
 from .recipe import FILL, KeepOut, Recipe, Seed, rounded
 from .recipe_checks import check_choice, check_recipe
-from .toml_values import Point, flag, nearest, number, point, show, spell, text, texts, whole
+from .toml_values import Point, flag, nearest, number, point, points, show, spell, text, texts, whole
 
 
 def load_toml(path: Path) -> dict[str, Any]:
@@ -105,6 +105,10 @@ def _orientation(value: object, where: str) -> str | Point:
     return point(value, where) if isinstance(value, list) else text(value, where)
 
 
+def _points(value: object, where: str) -> tuple[Point, ...]:
+    return points(value, where) if value != [] else ()
+
+
 def _fill(value: object, where: str) -> Fill:
     return Fill(field_from_toml(value, where))
 
@@ -169,6 +173,7 @@ READERS: dict[str, dict[str, Callable[[object, str], Any]]] = {
         "tolerance": number,
         "symmetry": text,
         "symmetry_centre": point,
+        "pins": _points,
     },
     "shaping": {
         "diameter": field_from_toml,
