@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from . import command, fixed_sizes, keep_outs, operators, panels, properties, versioning
+from . import command, fixed_sizes, hand_work, keep_outs, operators, panels, properties, versioning
 
-MODULES = (properties, operators, fixed_sizes, keep_outs, panels, versioning, command)
+MODULES = (properties, operators, fixed_sizes, hand_work, keep_outs, panels, versioning, command)
 
 
 def register() -> None:

@@ -135,6 +135,7 @@ def put(obj: bpy.types.Object, source: Source, recipe: Recipe, laid: Laid) -> No
     """Write what was laid to the pattern's object."""
     settings = obj.bubble_pattern
     write_pattern(obj, laid.pattern, settings.base, source.base)
+    settings.hand_made = False
     note(settings, source, recipe, laid)
     settings.six = laid.quality.six if np.isfinite(laid.quality.six) else -1.0
     settings.gap_min = laid.quality.gap_min if np.isfinite(laid.quality.gap_min) else -1.0
@@ -181,6 +182,8 @@ def react(settings: Any, context: bpy.types.Context, repack: bool) -> None:
         or not settings.made_with
     ):
         return
+    if settings.hand_made and not is_only_shape(settings):
+        return  # hand work is not thrown away without being asked
     try:
         if not repack and is_only_shape(settings):
             reshape(obj, context)
@@ -202,6 +205,11 @@ def reshape(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     start = time.perf_counter()
     source = read_source(settings.base, settings.region, context, recipe)
     if source.fingerprint != settings.fingerprint:
+        if settings.hand_made:
+            raise PatternError(
+                "The base has changed since the features were settled by hand: update the pattern, which "
+                "keeps only those that are pinned"
+            )
         drive(update_steps(obj, context))
         return
     pattern = reshaped(read_pattern(obj, source.base.mesh), source.region, recipe, source.surroundings)

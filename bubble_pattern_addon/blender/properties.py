@@ -12,7 +12,7 @@ from .feature_properties import FeatureSettings
 from .field_properties import BubblePatternField
 from .keep_out_properties import BubblePatternKeepOut
 from .limit_properties import LimitSettings
-from .packing_properties import PackingSettings
+from .packing_properties import BubblePatternPin, PackingSettings
 from .reacting import redraw_preview
 from .region_properties import RegionSettings
 from .result_properties import ResultSettings
@@ -98,7 +98,13 @@ def pattern_of(obj: bpy.types.Object | None) -> bpy.types.Object | None:
     return on_base[0] if on_base else None
 
 
-CLASSES = (BubblePatternField, BubblePatternKeepOut, BubblePatternSeed, BubblePatternSettings)
+CLASSES = (
+    BubblePatternField,
+    BubblePatternKeepOut,
+    BubblePatternPin,
+    BubblePatternSeed,
+    BubblePatternSettings,
+)
 _register, _unregister = bpy.utils.register_classes_factory(CLASSES)
 
 

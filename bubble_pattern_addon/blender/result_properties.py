@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from bpy.props import FloatProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, FloatProperty, IntProperty, StringProperty
 
 
 class ResultSettings:
@@ -14,6 +14,7 @@ class ResultSettings:
     size_trace: StringProperty(options={'HIDDEN'})
     trouble: StringProperty(options={'HIDDEN'})
     version: IntProperty(options={'HIDDEN'})
+    hand_made: BoolProperty(options={'HIDDEN'})
     seconds: FloatProperty(options={'HIDDEN'})
     count: IntProperty(name="Features", description="Number of features", options={'HIDDEN'})
     shrunk: IntProperty(options={'HIDDEN'})

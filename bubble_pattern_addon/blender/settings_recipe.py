@@ -44,6 +44,7 @@ def recipe_of(settings: Any) -> Recipe:
             seed=settings.seed,
             iterations=settings.iterations,
             tolerance=typed(settings.tolerance),
+            pins=tuple(point_of(pin.at) for pin in settings.pins),
         ),
         shaping=Shaping(
             diameter=diameter_of(settings),
@@ -135,6 +136,9 @@ def take_packing(settings: Any, packing: Packing) -> None:
     settings.seed = packing.seed
     settings.iterations = packing.iterations
     settings.tolerance = packing.tolerance
+    settings.pins.clear()
+    for pin in packing.pins:
+        settings.pins.add().at = pin
 
 
 def take_shaping(settings: Any, shaping: Shaping) -> None:

@@ -45,7 +45,6 @@ AROUND, PUSH = 2.5, 2.0
 MOST_STRETCH = 1.15
 # Where no bubble is within so many pitches of the first row's track, it lacks one.
 LACKING = 0.8
-SETTLED = "Settled by hand: packing anew keeps only what is pinned."
 
 
 @dataclass(frozen=True)
@@ -53,13 +52,15 @@ class HandWork:
     """The bubbles of a pattern after hand work, n of them.
 
     position: (n, 3) where they are; bubble: (n,) which of the pattern's each is, by id, or -1 for those that
-    were added; moved: (n,) which have been moved, whatever their position says; pinned: (n,) which stay
+    were added; moved: (n,) which have been moved, whatever their position says; pinned: (n,) which stay;
+    gone: (m, 3) where those were that have been deleted
     """
 
     position: Floats
     bubble: Ints
     moved: Bools
     pinned: Bools
+    gone: Floats
 
 
 def settle_steps(
@@ -69,8 +70,9 @@ def settle_steps(
     recipe: Recipe,
     surroundings: Surroundings = NOTHING,
     fill_voids: bool = False,
-) -> Steps[Pattern]:
-    """The pattern `before` with its bubbles as `hand` has them, settled and shaped as `recipe` says.
+) -> Steps[tuple[Pattern, Floats]]:
+    """The pattern `before` with its bubbles as `hand` has them, settled and shaped as `recipe` says;
+    and where the pinned ones are now, (p, 3).
 
     Bubbles keep their ids, also the pattern's that are there no longer keep theirs; added ones get new ones.
 
@@ -80,11 +82,11 @@ def settle_steps(
     yield Progress("Reading the region", 0.0)
     ground = ground_of(region, bound_packing(region, recipe, surroundings))
     notes = () if recipe.packing.symmetry == OFF else (NOT_SYMMETRIC,)
-    ground = replace(ground, notes=(*notes, SETTLED))
+    ground = replace(ground, notes=notes)
     whole = all_bubbles(before)
     crowd = _taken_up(ground, whole, hand)
     check_apart(ground.charts, crowd.spots.take(hand.pinned), ground.pitch(crowd.spots)[hand.pinned])
-    gaps = whole.position[~np.isin(whole.ids, hand.bubble)]
+    stay, gaps = positions(ground.charts, crowd.spots.take(hand.pinned)), hand.gone
     if fill_voids:
         crowd, gaps = _with_whole_row(ground, crowd), gaps[:0]
     crowd = replace(crowd, spots=_inside(ground, _parted(ground, crowd), crowd.free))
@@ -92,7 +94,8 @@ def settle_steps(
     crowd = _taken(crowd, np.argsort(crowd.ids))
     yield Progress("Shaping the features", 0.95)
     bubbles, first = Bubbles(crowd.spots), crowd.first | _beside_boundary(ground, crowd.spots)
-    return laid(ground, bubbles, first, recipe, surroundings, crowd.ids, crowd.stretch)
+    pattern = laid(ground, bubbles, first, recipe, surroundings, crowd.ids, crowd.stretch)
+    return pattern, stay
 
 
 @dataclass(frozen=True)

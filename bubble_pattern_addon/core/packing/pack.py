@@ -153,9 +153,10 @@ def _settled(
         yield Progress("Packing the bubbles", 0.2 + 0.2 * number)
         local = local_pitch(ground, bubbles)
         settle = relax if packing.integrator == "fire" else integrate
-        bubbles, _ = settle(
-            ground, bubbles, filling(ground, bubbles, local), packing.iterations, packing.tolerance
-        )
+        # At one pitch everywhere, whoever comes or goes after the first round stirs but a few neighbours.
+        later = number > 0 and ground.uniform is not None
+        steps = max(packing.iterations // (2 if later else 1), 1)
+        bubbles, _ = settle(ground, bubbles, filling(ground, bubbles, local), steps, packing.tolerance)
         bubbles, changed = control(ground, bubbles, local)
         if not changed:
             break
