@@ -182,7 +182,7 @@ def react(settings: Any, context: bpy.types.Context, repack: bool) -> None:
         or not settings.made_with
     ):
         return
-    if settings.hand_made and not is_only_shape(settings):
+    if settings.hand_made and (repack or not is_only_shape(settings)):
         return  # hand work is not thrown away without being asked
     try:
         if not repack and is_only_shape(settings):

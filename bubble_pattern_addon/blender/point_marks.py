@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from array import array
+import base64
 from typing import Any
 
 import bpy
@@ -12,19 +12,21 @@ from ..core.mesh import Bools, Floats, Ints
 from .attributes import read_values, write_values
 
 PINNED = "pinned"
-# Where the points were laid, by id: what is missing from the mesh has been deleted by hand.
-LAID = "bubble_pattern_laid"
+# Where a point was laid, as it is kept: what is missing from the mesh has been deleted by hand.
+LAID = np.dtype([("id", "<i4"), ("at", "<f4", 3)])
 
 
 def remember(obj: bpy.types.Object, position: Floats, ids: Ints) -> None:
     """Keep where the points of `obj` were laid, (n, 3), by id (n,)."""
-    obj[LAID] = array("d", np.column_stack([ids, position]).ravel().tolist())
+    kept = np.empty(len(ids), dtype=LAID)
+    kept["id"], kept["at"] = ids, position
+    obj.bubble_pattern.laid = base64.b64encode(kept.tobytes()).decode("ascii")
 
 
 def laid_places(obj: bpy.types.Object) -> tuple[Ints, Floats]:
     """Ids (n,) and places (n, 3) of the points as they were laid; none where a file does not say."""
-    values = np.array(obj.get(LAID, ()), dtype=np.float64).reshape(-1, 4)
-    return values[:, 0].astype(np.int64), values[:, 1:]
+    kept = np.frombuffer(base64.b64decode(obj.bubble_pattern.laid), dtype=LAID)
+    return kept["id"].astype(np.int64), kept["at"].astype(np.float64)
 
 
 def mark_pins(obj: bpy.types.Object, position: Floats, pitch: Floats) -> None:

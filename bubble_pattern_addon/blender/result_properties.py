@@ -10,6 +10,7 @@ class ResultSettings:
     """What came out of the last generation. -1 where nothing could be measured."""
 
     made_with: StringProperty(options={'HIDDEN'})
+    laid: StringProperty(options={'HIDDEN'})
     fingerprint: StringProperty(options={'HIDDEN'})
     size_trace: StringProperty(options={'HIDDEN'})
     trouble: StringProperty(options={'HIDDEN'})
