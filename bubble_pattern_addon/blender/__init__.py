@@ -2,9 +2,33 @@
 
 from __future__ import annotations
 
-from . import command, fixed_sizes, hand_work, keep_outs, operators, panels, properties, versioning
+from . import (
+    command,
+    fixed_sizes,
+    hand_work,
+    keep_outs,
+    live,
+    operators,
+    panels,
+    properties,
+    runs,
+    versioning,
+    watching,
+)
 
-MODULES = (properties, operators, fixed_sizes, hand_work, keep_outs, panels, versioning, command)
+MODULES = (
+    properties,
+    watching,
+    runs,
+    live,
+    operators,
+    fixed_sizes,
+    hand_work,
+    keep_outs,
+    panels,
+    versioning,
+    command,
+)
 
 
 def register() -> None:

@@ -7,7 +7,6 @@ Docstrings of operators are their tooltips.
 
 from __future__ import annotations
 
-import time
 from typing import TYPE_CHECKING
 
 import bpy
@@ -171,10 +170,11 @@ def settle(obj: bpy.types.Object, context: bpy.types.Context, fill_voids: bool, 
     from ..core.settling import settle_steps
     from . import generation
     from .pattern_object import point_ids, read_pattern
+    from .sources import read_source
 
-    settings, start = obj.bubble_pattern, time.perf_counter()
+    settings = obj.bubble_pattern
     recipe = recipe_of(settings)
-    source = generation.read_source(settings.base, settings.region, context, recipe)
+    source = read_source(settings.base, settings.region, context, recipe)
     if source.fingerprint != settings.fingerprint or not generation.is_only_shape(settings):
         raise PatternError(
             "The base or the packing has changed since the features were laid: update the pattern, then "
@@ -192,11 +192,11 @@ def settle(obj: bpy.types.Object, context: bpy.types.Context, fill_voids: bool, 
     pattern, stay = drive(steps)
     keep_pins(settings, stay)
     recipe = replace(recipe, packing=replace(recipe.packing, pins=tuple(point_of(at) for at in stay)))
-    seconds = settings.seconds
     quality = measure(pattern, source.region)
     by_hand = settings.hand_made or touched
-    generation.put(obj, source, recipe, generation.measured(pattern, source.region, quality, start))
-    settings.seconds, settings.hand_made = seconds, by_hand
+    laid = replace(generation.measured(pattern, source.region, quality), seconds=settings.seconds)
+    generation.put(obj, source, recipe, laid)
+    settings.hand_made = by_hand
     obj.data.vertices.foreach_set("select", np.isin(point_ids(obj), chosen))
     return len(pattern)
 

@@ -7,6 +7,7 @@ Docstrings of operators are their tooltips.
 from __future__ import annotations
 
 import hashlib
+from collections import OrderedDict
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -32,8 +33,9 @@ if TYPE_CHECKING:
 
 # Face attribute that the button marks kept out faces with.
 ATTRIBUTE = "bubble_keep_out"
-# The region cut last, by what it was cut from: most changes of settings leave it as it is.
-_last: dict[str, Region] = {}
+# The regions cut last, by what they were cut from: most changes of settings leave them as they are.
+_cut: OrderedDict[str, Region] = OrderedDict()
+KEPT = 3
 
 
 # -- read ----------------------------------------------------------------------------------------------------
@@ -83,25 +85,29 @@ def solid_of(obj: bpy.types.Object, to_frame: Floats, context: bpy.types.Context
 
 
 def cut_to_choice(
-    base: Base, selected: Bools, parts: Ints | None, choice: RegionChoice, context: bpy.types.Context
+    base: Base,
+    selected: Bools,
+    parts: Ints | None,
+    choice: RegionChoice,
+    fingerprint: str,
+    context: bpy.types.Context,
 ) -> tuple[Region, str]:
-    """The region of the `selected` triangles (T,) with its `parts` (T,) and without what is kept out; and a
-    trace of what that hangs on.
+    """The region of the `selected` triangles (T,) with its `parts` (T,) and without what is kept out, and a
+    trace of that; all else is what `fingerprint` stands for.
     """
     from ..core.keep_out import region_with_keep_outs
 
-    trace = base.fingerprint(selected, parts)
     masks = {**base.materials, **base.attributes}
     solids = read_solids(choice.keep_out, base.frame, context)
-    if not choice.keep_out:
-        return region_with_keep_outs(base.mesh, selected, parts, choice.gap, (), masks, solids), trace
-    trace += trace_of(choice.keep_out, masks, solids)
-    key = f"{trace} {choice.gap} {choice.keep_out}"
-    if key not in _last:
-        region = region_with_keep_outs(base.mesh, selected, parts, choice.gap, choice.keep_out, masks, solids)
-        _last.clear()
-        _last[key] = region
-    return _last[key], trace
+    trace = trace_of(choice.keep_out, masks, solids)
+    key = f"{fingerprint} {trace} {choice.gap} {choice.keep_out}"
+    if key not in _cut:
+        _cut[key] = region_with_keep_outs(
+            base.mesh, selected, parts, choice.gap, choice.keep_out, masks, solids
+        )
+        while len(_cut) > KEPT:
+            _cut.popitem(last=False)
+    return _cut[key], trace
 
 
 def trace_of(keep_outs: Sequence[KeepOut], masks: dict[str, Bools], solids: Solids) -> str:

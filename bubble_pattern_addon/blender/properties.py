@@ -13,7 +13,7 @@ from .field_properties import BubblePatternField
 from .keep_out_properties import BubblePatternKeepOut
 from .limit_properties import LimitSettings
 from .packing_properties import BubblePatternPin, PackingSettings
-from .reacting import redraw_preview
+from .reacting import redraw_preview, show_cut
 from .region_properties import RegionSettings
 from .result_properties import ResultSettings
 from .shaping_properties import BubblePatternSeed, ShapingSettings
@@ -61,8 +61,15 @@ class BubblePatternSettings(
     )
     live: BoolProperty(
         name="Live Update",
-        description="Lay the pattern anew with every change, as long as that takes less than half a second",
+        description="Lay the pattern anew with every change of a setting",
         default=True,
+    )
+    cut_preview: BoolProperty(
+        name="Cut Preview",
+        description="Show the base with its holes before they are made, until a setting or the base changes",
+        default=False,
+        options={'SKIP_SAVE'},
+        update=show_cut,
     )
     show_bubbles: BoolProperty(
         name="Show Bubbles",
@@ -84,7 +91,7 @@ def is_pattern(obj: bpy.types.Object | None) -> bool:
 
 def pattern_objects(base: bpy.types.Object) -> list[bpy.types.Object]:
     """The patterns on `base`, in the order of their names."""
-    return sorted((o for o in base.children if o.bubble_pattern.base == base), key=lambda o: o.name)
+    return sorted((o for o in base.children if is_on(base.bubble_pattern, o)), key=lambda o: o.name)
 
 
 def pattern_of(obj: bpy.types.Object | None) -> bpy.types.Object | None:

@@ -14,6 +14,7 @@ class ResultSettings:
     fingerprint: StringProperty(options={'HIDDEN'})
     size_trace: StringProperty(options={'HIDDEN'})
     trouble: StringProperty(options={'HIDDEN'})
+    cut_trouble: StringProperty(options={'HIDDEN'})
     version: IntProperty(options={'HIDDEN'})
     hand_made: BoolProperty(options={'HIDDEN'})
     seconds: FloatProperty(options={'HIDDEN'})

@@ -11,9 +11,10 @@ import bpy
 from ..core.blending import Fill
 from ..core.errors import PatternError, RecipeError
 from ..core.metric import Constant, Described
-from ..core.recipe import Feature, Limits, Packing, Recipe, RegionChoice, Seed, Shaping
+from ..core.recipe import Limits, Packing, Recipe, RegionChoice, Seed, Shaping
 from ..core.recipe_checks import check_keep_outs, check_recipe
 from ..core.recipe_file import recipe_to_toml
+from .feature_settings import feature_of, placing, take_feature
 from .field_properties import point_of, typed
 from .field_recipe import described, take
 from .keep_out_properties import is_given, keep_out_of, take_keep_out
@@ -22,7 +23,6 @@ from .properties import BubblePatternSettings
 
 def recipe_of(settings: Any) -> Recipe:
     """The recipe that `settings` stand for. Raises RecipeError where they contradict one another."""
-    through = settings.depth_mode == 'THROUGH'
     recipe = Recipe(
         region=RegionChoice(
             attribute=settings.region or None,
@@ -53,11 +53,7 @@ def recipe_of(settings: Any) -> Recipe:
             tolerance=typed(settings.shaping_tolerance),
             iterations=settings.shaping_iterations,
         ),
-        feature=Feature(
-            depth=None if through else typed(settings.depth),
-            sides=settings.sides or None,
-            tolerance=typed(settings.facet_tolerance) or None,
-        ),
+        feature=feature_of(settings),
         limits=Limits(
             min_web=typed(settings.min_web),
             min_margin=typed(settings.min_margin),
@@ -86,12 +82,7 @@ def take_recipe(settings: Any, recipe: Recipe) -> None:
         take_keep_out(settings.keep_out.add(), keep_out)
     take_packing(settings, recipe.packing)
     take_shaping(settings, recipe.shaping)
-    feature = recipe.feature
-    settings.depth_mode = 'THROUGH' if feature.depth is None else 'BLIND'
-    if feature.depth is not None:
-        settings.depth = feature.depth
-    settings.sides = feature.sides or 0
-    settings.facet_tolerance = feature.tolerance or 0.0
+    take_feature(settings, recipe.feature)
     settings.min_web = recipe.limits.min_web
     settings.min_margin = recipe.limits.min_margin
     settings.min_diameter = recipe.limits.min_diameter
@@ -167,7 +158,7 @@ def packing_text(recipe: Recipe) -> str:
 
 def recipe_text(recipe: Recipe) -> str:
     """What the pattern's points depend on, as text; how the features are cut is left out."""
-    return recipe_to_toml(replace(recipe, feature=Feature()))
+    return recipe_to_toml(replace(recipe, feature=placing(recipe.feature)))
 
 
 def is_outdated(settings: Any) -> bool:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from .feature_recipe import Feature as Feature
 from .isometries import OFF
 from .metric import Constant, Described
 from .toml_values import Point
@@ -18,7 +19,6 @@ from .toml_values import Point
 INTEGRATORS = ("fire", "rk4")
 ORIENTATIONS = ("edge", "best")
 SOLVERS = ("direct", "iterate")
-KINDS = ("hole",)
 FORMATS = ("stl", "obj", "ply", "3mf", "glb")
 
 FILL = 0.6  # a feature's diameter relative to the pitch where the recipe gives only one of them
@@ -120,16 +120,6 @@ class Shaping:
     solver: str = "direct"
     tolerance: float = 1e-6
     iterations: int = 10_000
-
-
-@dataclass(frozen=True)
-class Feature:
-    """What one feature is. depth None: through the near wall; facets by chord height, at least min_sides."""
-
-    kind: str = "hole"
-    depth: float | None = None
-    sides: int | None = None
-    tolerance: float | None = None
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,11 @@ import math
 
 from .blending import Fill
 from .errors import RecipeError
+from .feature_checks import check_feature
 from .field_tables import asks_for_pitch
 from .isometries import check_symmetry
 from .metric import Constant, Described
-from .recipe import FORMATS, INTEGRATORS, KINDS, ORIENTATIONS, SOLVERS, KeepOut, Recipe, RegionChoice, Shaping
+from .recipe import FORMATS, INTEGRATORS, ORIENTATIONS, SOLVERS, KeepOut, Recipe, RegionChoice, Shaping
 from .toml_values import Point, check_above, check_at_least, check_finite, check_one_of
 
 # what a keep-out can be: which keys it needs then, and which it may have besides its margin
@@ -87,7 +88,7 @@ def check_recipe(recipe: Recipe) -> None:
 
     The region's choice is left to check_choice: a caller that holds the faces already needs none.
     """
-    packing, feature, limits = recipe.packing, recipe.feature, recipe.limits
+    packing, limits = recipe.packing, recipe.limits
     _check_length(packing.pitch, "[packing] pitch")
     if asks_for_pitch(packing.pitch):
         raise RecipeError("[packing] pitch is given as a share of itself: fill goes with diameters")
@@ -106,13 +107,7 @@ def check_recipe(recipe: Recipe) -> None:
     for pin in packing.pins:
         for coordinate in pin:
             check_finite(coordinate, "[packing] pins")
-    check_one_of(feature.kind, KINDS, "[feature] kind")
-    if feature.depth is not None:
-        check_above(feature.depth, "[feature] depth")
-    if feature.sides is not None:
-        check_at_least(feature.sides, 3, "[feature] sides")
-    if feature.tolerance is not None:
-        check_above(feature.tolerance, "[feature] tolerance")
+    check_feature(recipe.feature, uniform_diameter(recipe))
     check_at_least(limits.min_web, 0, "[limits] min_web")
     check_at_least(limits.min_margin, 0, "[limits] min_margin")
     check_at_least(limits.min_diameter, 0, "[limits] min_diameter")

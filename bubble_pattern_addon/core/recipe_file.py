@@ -10,6 +10,7 @@ from typing import Any
 
 from .blending import Fill
 from .errors import RecipeError
+from .feature_recipe import READERS as FEATURE_READERS
 from .field_tables import field_from_toml, field_to_toml
 from .metric import Constant, Described
 from .recipe import FILL, KeepOut, Recipe, Seed, rounded
@@ -183,7 +184,7 @@ READERS: dict[str, dict[str, Callable[[object, str], Any]]] = {
         "tolerance": number,
         "iterations": whole,
     },
-    "feature": {"kind": text, "depth": number, "sides": whole, "tolerance": number},
+    "feature": FEATURE_READERS,
     "limits": {"min_web": number, "min_margin": number, "min_diameter": number},
     "output": {"blend": flag, "picture": flag, "formats": texts},
 }
@@ -202,6 +203,7 @@ def recipe_to_toml(recipe: Recipe) -> str:
             _line(entry.name, getattr(table, entry.name))
             for entry in fields(table)
             if getattr(table, entry.name) is not None
+            and (getattr(table, entry.name) or entry.name != "points")
         ]
         lines += [""]
     return "\n".join(lines)

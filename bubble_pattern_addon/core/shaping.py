@@ -8,6 +8,7 @@ import numpy as np
 
 from .averaging import averaged
 from .errors import FieldError, RecipeError
+from .heading import headed
 from .limits import limited
 from .links import Links, links_of
 from .mesh import Floats
@@ -37,7 +38,9 @@ def shaped(
     Raises RecipeError where a diameter is no positive length, a seed does not fit or no feature is left,
     FieldError where the surroundings lack something.
     """
-    wished, notes = diameters(recipe.shaping, bubbles, links, replace(surroundings, region=region))
+    surroundings = replace(surroundings, region=region)
+    wished, notes = diameters(recipe.shaping, bubbles, links, surroundings)
+    bubbles = headed(bubbles, links, recipe.feature, surroundings)
     pattern = limited(
         replace(bubbles, diameter=wished, notes=(*bubbles.packing_notes, *notes)), region, recipe.limits
     )

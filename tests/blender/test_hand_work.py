@@ -12,7 +12,7 @@ bpy = pytest.importorskip("bpy", reason="needs the bpy module: python scripts/te
 
 import bmesh  # noqa: E402
 
-from bubble_pattern_addon.blender import generation, settings_recipe  # noqa: E402
+from bubble_pattern_addon.blender import settings_recipe, sources  # noqa: E402
 
 from .parts import activate, add_on_top, panel, plate, points  # noqa: E402
 from .test_file import reopened  # noqa: E402
@@ -264,7 +264,7 @@ def test_settled_pattern_is_saved_and_follows_its_base(tmp_path: Path) -> None:
     settings.base.location = (1.0, 2.0, 3.0)
     bpy.context.view_layer.update()
     recipe = settings_recipe.recipe_of(settings)
-    source = generation.read_source(settings.base, settings.region, bpy.context, recipe)
+    source = sources.read_source(settings.base, settings.region, bpy.context, recipe)
     assert source.fingerprint == settings.fingerprint
     activate(pattern)
     bpy.ops.object.mode_set(mode='EDIT')

@@ -10,7 +10,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from bubble_pattern_addon.blender import generation, settings_recipe  # noqa: E402
+from bubble_pattern_addon.blender import settings_recipe, sources  # noqa: E402
 from bubble_pattern_addon.blender.properties import pattern_of  # noqa: E402
 from bubble_pattern_addon.core.recipe import KeepOut, RegionChoice  # noqa: E402
 from tests.blender import parts  # noqa: E402
@@ -63,7 +63,7 @@ def test_selected_object_is_kept_out_below_and_when_it_moves() -> None:
     obj.scale = (0.5, 0.5, 1.0)
     bpy.context.view_layer.update()
     recipe = settings_recipe.recipe_of(pattern.bubble_pattern)
-    source = generation.read_source(
+    source = sources.read_source(
         pattern.bubble_pattern.base, pattern.bubble_pattern.region, bpy.context, recipe
     )
     assert source.fingerprint != before
