@@ -8,10 +8,13 @@ from . import (
     hand_work,
     keep_outs,
     live,
+    offenders,
     operators,
+    overlay,
     panels,
     properties,
     runs,
+    solving,
     versioning,
     watching,
 )
@@ -25,8 +28,11 @@ MODULES = (
     fixed_sizes,
     hand_work,
     keep_outs,
+    solving,
+    offenders,
     panels,
     versioning,
+    overlay,
     command,
 )
 

@@ -194,7 +194,7 @@ def settle(obj: bpy.types.Object, context: bpy.types.Context, fill_voids: bool, 
     recipe = replace(recipe, packing=replace(recipe.packing, pins=tuple(point_of(at) for at in stay)))
     quality = measure(pattern, source.region)
     by_hand = settings.hand_made or touched
-    laid = replace(generation.measured(pattern, source.region, quality), seconds=settings.seconds)
+    laid = replace(generation.measured(pattern, source.region, recipe, quality), seconds=settings.seconds)
     generation.put(obj, source, recipe, laid)
     settings.hand_made = by_hand
     obj.data.vertices.foreach_set("select", np.isin(point_ids(obj), chosen))

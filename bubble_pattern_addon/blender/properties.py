@@ -15,8 +15,9 @@ from .limit_properties import LimitSettings
 from .packing_properties import BubblePatternPin, PackingSettings
 from .reacting import redraw_preview, show_cut
 from .region_properties import RegionSettings
-from .result_properties import ResultSettings
+from .result_properties import BubblePatternBroken, ResultSettings
 from .shaping_properties import BubblePatternSeed, ShapingSettings
+from .solve_properties import SolveSettings
 
 # Raised when a property changes its meaning; see upgrade.
 SETTINGS_VERSION = 3
@@ -38,6 +39,7 @@ class BubblePatternSettings(
     ShapingSettings,
     FeatureSettings,
     LimitSettings,
+    SolveSettings,
     ResultSettings,
     bpy.types.PropertyGroup,
 ):
@@ -110,6 +112,7 @@ CLASSES = (
     BubblePatternKeepOut,
     BubblePatternPin,
     BubblePatternSeed,
+    BubblePatternBroken,
     BubblePatternSettings,
 )
 _register, _unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -9,26 +9,25 @@ from .errors import RecipeError
 from .feature_checks import check_feature
 from .field_tables import asks_for_pitch
 from .isometries import check_symmetry
+from .keep_out_checks import check_keep_outs
 from .metric import Constant, Described
-from .recipe import FORMATS, INTEGRATORS, ORIENTATIONS, SOLVERS, KeepOut, Recipe, RegionChoice, Shaping
-from .toml_values import Point, check_above, check_at_least, check_finite, check_one_of
+from .nominal import check_sizes
+from .processes import PROCESSES
+from .recipe import (
+    FORMATS,
+    INTEGRATORS,
+    ORIENTATIONS,
+    SOLVERS,
+    Limits,
+    Output,
+    Recipe,
+    RegionChoice,
+    Shaping,
+)
+from .toml_values import check_above, check_at_least, check_finite, check_one_of
 
-# what a keep-out can be: which keys it needs then, and which it may have besides its margin
-KEEP_OUT_NEEDS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    "faces": ((), ()),
-    "object": ((), ("axis", "reach")),
-    "collection": ((), ("axis", "reach")),
-    "file": ((), ("axis", "reach")),
-    "sphere": (("diameter",), ()),
-    "cylinder": (("diameter",), ("axis", "reach")),
-    "box": (("size",), ("axis", "along", "reach")),
-}
-
-
-def parallel(one: Point, other: Point) -> bool:
-    """Whether two directions are the same or opposite, as nearly as a box's sides can be told by."""
-    cosine = sum(a * b for a, b in zip(one, other, strict=True)) / (math.hypot(*one) * math.hypot(*other))
-    return abs(cosine) > 1 - 1e-9
+# Share of the plane that a hexagonal arrangement of touching circles covers: pi / (2 sqrt 3).
+DENSEST = math.pi / (2 * math.sqrt(3))
 
 
 def check_choice(choice: RegionChoice) -> None:
@@ -47,40 +46,6 @@ def check_choice(choice: RegionChoice) -> None:
     if choice.gap and not choice.parts:
         raise RecipeError("[region] gap goes between parts: name these too, or leave gap out")
     check_keep_outs(choice)
-
-
-def check_keep_outs(choice: RegionChoice) -> None:
-    """RecipeError unless every keep-out is one thing with what that needs."""
-    for count, keep_out in enumerate(choice.keep_out, 1):
-        _check_keep_out(keep_out, f"[region] keep_out, entry {count}")
-
-
-def _check_keep_out(keep_out: KeepOut, where: str) -> None:
-    """RecipeError, which names the entry by `where`, unless it is one thing with what that needs."""
-    named = [key for key in KEEP_OUT_NEEDS if getattr(keep_out, key) is not None]
-    if len(named) != 1:
-        said = f"names {len(named)} things ({', '.join(named)})" if named else "names nothing"
-        raise RecipeError(f"{where} {said}: give one of {', '.join(KEEP_OUT_NEEDS)}")
-    needed, allowed = KEEP_OUT_NEEDS[named[0]]
-    for key in ("diameter", "size", "axis", "along", "reach"):
-        value = getattr(keep_out, key)
-        if value is None and key in needed:
-            raise RecipeError(f"{where}: a {named[0]} lacks {key}: give it")
-        if value is not None and key not in needed and key not in allowed:
-            raise RecipeError(f"{where}: {key} does not go with {named[0]}: leave it out")
-    if keep_out.diameter is not None:
-        check_above(keep_out.diameter, f"{where}: diameter")
-    for coordinate in keep_out.size or ():
-        check_above(coordinate, f"{where}: size")
-    for key in ("axis", "along"):
-        way = getattr(keep_out, key)
-        if way is not None and not any(way):
-            raise RecipeError(f"{where}: {key} = [0, 0, 0] is no direction: give a vector")
-    if keep_out.along is not None and parallel(keep_out.along, keep_out.axis or (0.0, 0.0, 1.0)):
-        raise RecipeError(f"{where}: along and axis of the box are parallel: give two directions")
-    if keep_out.reach is not None:
-        check_at_least(keep_out.reach, 0, f"{where}: reach")
-    check_at_least(keep_out.margin, 0, f"{where}: margin")
 
 
 def check_recipe(recipe: Recipe) -> None:
@@ -108,11 +73,9 @@ def check_recipe(recipe: Recipe) -> None:
         for coordinate in pin:
             check_finite(coordinate, "[packing] pins")
     check_feature(recipe.feature, uniform_diameter(recipe))
-    check_at_least(limits.min_web, 0, "[limits] min_web")
-    check_at_least(limits.min_margin, 0, "[limits] min_margin")
-    check_at_least(limits.min_diameter, 0, "[limits] min_diameter")
-    for name in recipe.output.formats:
-        check_one_of(name, FORMATS, "[output] formats")
+    _check_limits(limits)
+    _check_solve(recipe)
+    _check_output(recipe.output)
     _check_room(recipe)
 
 
@@ -144,6 +107,54 @@ def _check_shaping(shaping: Shaping) -> None:
     check_one_of(shaping.solver, SOLVERS, "[shaping] solver")
     check_above(shaping.tolerance, "[shaping] tolerance")
     check_at_least(shaping.iterations, 1, "[shaping] iterations")
+    if shaping.sizes is not None:
+        check_sizes(shaping.sizes, "[shaping] sizes")
+
+
+def _check_limits(limits: Limits) -> None:
+    check_at_least(limits.min_web, 0, "[limits] min_web")
+    check_at_least(limits.min_margin, 0, "[limits] min_margin")
+    check_at_least(limits.min_diameter, 0, "[limits] min_diameter")
+    if limits.process is not None:
+        check_one_of(limits.process, tuple(PROCESSES), "[limits] process")
+    if limits.thickness is not None:
+        check_above(limits.thickness, "[limits] thickness")
+
+
+def _check_output(output: Output) -> None:
+    if output.density is not None:
+        check_above(output.density, "[output] density")
+    for name in output.formats:
+        check_one_of(name, FORMATS, "[output] formats")
+
+
+def _check_solve(recipe: Recipe) -> None:
+    """RecipeError for a target that is none, or that cannot be reached the way that is asked for."""
+    solve = recipe.solve
+    if not solve:
+        if solve.by is not None:
+            raise RecipeError("[solve] has no target: give open_area or count, or leave the table out")
+        return
+    if solve.open_area is not None and solve.count is not None:
+        raise RecipeError("[solve] gives both open_area and count: keep one of them")
+    if solve.by is not None:
+        check_one_of(solve.by, ("diameter", "pitch"), "[solve] by")
+    if solve.count is not None:
+        check_at_least(solve.count, 1, "[solve] count")
+        if solve.by == "diameter":
+            raise RecipeError(
+                '[solve] count does not hang on the diameter: solve by = "pitch", or leave by out'
+            )
+    elif solve.open_area is not None and not 0 < solve.open_area < DENSEST:
+        raise RecipeError(
+            f"[solve] open_area = {solve.open_area:g} must be a share above 0 and below {DENSEST:.4g}, which "
+            "touching circles take"
+        )
+    if solve.open_area is not None and solve.by == "pitch" and isinstance(recipe.shaping.diameter, Fill):
+        raise RecipeError(
+            "[shaping] fill lets the diameter follow the pitch, so that the open area hangs on fill alone: "
+            'solve by = "diameter", or give a diameter'
+        )
 
 
 def uniform_diameter(recipe: Recipe) -> float | None:
