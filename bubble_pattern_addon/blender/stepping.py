@@ -13,8 +13,9 @@ from ..core.progress import Steps, drive
 from . import runs
 from .settings_recipe import spoken
 
-# So long Blender may stand still between two looks at the mouse, in seconds.
-SLICE = 0.06
+# So long Blender may stand still between two looks at the mouse, in seconds: where drawing takes longer than
+# the first, as long as it takes, or the work would hardly go on.
+SLICE, LONGEST_SLICE = 0.06, 0.3
 # Work that ends within this time never becomes modal: the redo panel works, and nothing flickers.
 PATIENCE = 0.4
 # Work on settings that change begins again when none has changed for so long, in seconds.
@@ -113,6 +114,7 @@ class SteppedOperator:
         self._timer = manager.event_timer_add(0.01, window=context.window)
         self._drawing: Any = None
         self._drawn = 0.0
+        self._worked = time.perf_counter()
         self._mode = context.mode
         self._outcome: set[str] | None = None
         self._moved = False
@@ -149,9 +151,11 @@ class SteppedOperator:
             self._run.renew(self.steps(context))
             self._outcome = None
         if self._outcome is None:
-            self._outcome = self.advance(context, SLICE)
+            others = time.perf_counter() - self._worked
+            self._outcome = self.advance(context, min(max(SLICE, others), LONGEST_SLICE))
             self._moved = not self.may_be_dragged()
             self.show(context)
+            self._worked = time.perf_counter()
 
     def is_let_go(self, event: bpy.types.Event) -> bool:
         """Whether no slider is being dragged any more, for all that the events tell.
