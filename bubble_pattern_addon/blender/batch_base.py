@@ -6,7 +6,6 @@ writes.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -29,7 +28,7 @@ from ..core.recipe_names import recipe_names, with_recipe_images
 from .applying import place_part, verdict_of
 from .attributes import CORNER_VERTEX, MATERIAL, write_values
 from .feature_objects import read_stamp as read_object_stamp
-from .generation import fill_settings, measured, put, read_source
+from .generation import fill_settings, measured, put
 from .marked_side import on_marked_side
 from .part_mesh import build_part_mesh
 from .pattern_object import new_pattern_object
@@ -41,6 +40,7 @@ from .provenance import Original, read_original
 from .reading import Base, evaluated_mesh, transformed, world_frame
 from .reading import read_base as read_object
 from .settings_recipe import recipe_of
+from .sources import read_source
 from .surroundings import read_painted, with_things
 from .target_region import ATTRIBUTE, store, stored
 
@@ -150,9 +150,8 @@ def write_blend(path: Path, run: Run) -> None:
         fill_settings(pattern_obj, base_obj, region, moved_recipe(with_images_in(run), to_frame, run.region))
         recipe = recipe_of(pattern_obj.bubble_pattern)
         source = read_source(base_obj, region, bpy.context, recipe)
-        start = time.perf_counter()
         own = moved(run.pattern, to_frame)
-        laid = measured(own, source.region, measure(own, source.region), start)
+        laid = measured(own, source.region, recipe, measure(own, source.region))
         laid = replace(laid, seconds=run.report["seconds"]["pack"])
         put(pattern_obj, source, recipe, laid)
         mesh = build_part_mesh(f"{base_obj.name} Part", run.part, run.pattern.places, base, original)

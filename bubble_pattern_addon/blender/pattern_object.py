@@ -33,8 +33,7 @@ def write_pattern(obj: bpy.types.Object, pattern: Pattern, base_object: bpy.type
     A bubble whose feature was left out is a point with the diameter 0: a later shaping may bring it back.
     """
     bubbles = all_bubbles(pattern)
-    mesh = obj.data
-    mesh.clear_geometry()
+    mesh = fresh_mesh(obj)
     mesh.vertices.add(len(bubbles))
     write_values(mesh, "position", 'POINT', 'FLOAT_VECTOR', bubbles.position)
     write_values(mesh, "id", 'POINT', 'INT', bubbles.ids)
@@ -50,11 +49,35 @@ def write_pattern(obj: bpy.types.Object, pattern: Pattern, base_object: bpy.type
     obj.matrix_basis = Matrix(base.frame.tolist())
 
 
+def fresh_mesh(obj: bpy.types.Object) -> bpy.types.Mesh:
+    """An empty mesh in the place of that of `obj`, under its name.
+
+    Blender's undo takes a mesh that is the same before and after a step for unchanged since, and would keep
+    what was written to it in between; and a linked duplicate of the pattern keeps its own points.
+    """
+    old = obj.data
+    mesh = bpy.data.meshes.new(old.name)
+    obj.data = mesh
+    if not old.users:
+        name = old.name
+        bpy.data.meshes.remove(old)
+        mesh.name = name
+    return mesh
+
+
+def own_mesh(obj: bpy.types.Object) -> bpy.types.Mesh:
+    """The mesh of `obj`, which no other object shows: a linked duplicate keeps its own sizes."""
+    if obj.data.users > 1:
+        obj.data = obj.data.copy()
+    return obj.data
+
+
 def write_sizes(obj: bpy.types.Object, pattern: Pattern) -> None:
     """Give the points of a pattern object the diameters in `pattern`, which has all their ids."""
     bubbles = all_bubbles(pattern)
     row = np.searchsorted(bubbles.ids, point_ids(obj))
     wished = bubbles.diameter if bubbles.wished is None else bubbles.wished
+    own_mesh(obj)
     write_values(obj.data, "diameter", 'POINT', 'FLOAT', bubbles.diameter[row])
     write_values(obj.data, "wished", 'POINT', 'FLOAT', wished[row])
     write_form(obj.data, take(bubbles, row))
@@ -101,7 +124,7 @@ def read_pattern(obj: bpy.types.Object, mesh: Mesh) -> Pattern:
     triangle = values("triangle", "value", np.int32).astype(np.int64)
     barycentric = values("barycentric", "vector", np.float32, 3).astype(np.float64)
     barycentric /= barycentric.sum(axis=1, keepdims=True)
-    position = (mesh.corners[triangle] * barycentric[:, :, None]).sum(axis=1)
+    position = (mesh.vertices[mesh.triangles[triangle]] * barycentric[:, :, None]).sum(axis=1)
     known = "wished" in points  # files of 0.1 have none
     ways: dict[str, Any] = {
         name: unit(values(name, "vector", np.float32, 3).astype(np.float64)) if name in points else None

@@ -32,3 +32,11 @@ def redraw_preview(settings: bpy.types.PropertyGroup, _context: bpy.types.Contex
 
     if settings.base is not None:
         show_preview(settings.id_data, settings.show_bubbles)
+
+
+def show_cut(settings: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    """The cut shall be shown, or no longer."""
+    from .cut_preview import toggle_cut
+
+    if settings.base is not None:
+        toggle_cut(settings, context)

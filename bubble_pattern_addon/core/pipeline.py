@@ -15,7 +15,7 @@ from .metric import Bound, Constant, Field, Places
 from .packing.pack import local_pitch, pack_steps
 from .pattern import Pattern
 from .progress import Progress, Steps
-from .recipe import Recipe
+from .recipe import Recipe, rounded
 from .region import Region
 from .shaping import bound, shaped
 from .surface import Charts, Spots, positions, smooth_normals, to_frame, to_space
@@ -67,10 +67,14 @@ def _check_lengths(region: Region, field: Field, name: str) -> None:
     values = field(places)
     bad = ~(np.isfinite(values) & (values > 0))
     if bad.any():
-        x, y, z = places.position[bad][0]
+        x, y, z = (float(value) for value in places.position[bad][0])
         raise RegionError(
-            f"The {name} is {values[bad][0]:.4g} at {x:.4g}, {y:.4g}, {z:.4g}: it must be a positive length "
-            "everywhere in the target region"
+            f"The {name} is {{value}} at {{x}}, {{y}}, {{z}}: it must be a positive length everywhere in the "
+            "target region",
+            value=rounded(float(values[bad][0])),
+            x=rounded(x),
+            y=rounded(y),
+            z=rounded(z),
         )
 
 

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from .boxtree import BoxTree, build_tree
 from .errors import RegionError
 from .mesh import Bools, Floats, Ints, Mesh
+
+if TYPE_CHECKING:
+    from .surface import Charts
 
 # A triangle is flat when its height is below this share of its longest edge: walking over it would divide by
 # zero.
@@ -49,6 +54,13 @@ class Region:
     def corners(self) -> Floats:
         """Corner positions of the region's triangles, (R, 3, 3)."""
         return self.base.vertices[self.base.triangles[self.triangles]]
+
+    @cached_property
+    def charts(self) -> Charts:
+        """Frames of the triangles."""
+        from .surface import make_charts  # which knows regions
+
+        return make_charts(self)
 
     @cached_property
     def area_vectors(self) -> Floats:
@@ -102,6 +114,11 @@ class Region:
         row, corner = self.rim.T
         ends = np.stack([(corner + 1) % 3, (corner + 2) % 3], axis=1)
         return self.corners[row[:, None], ends]
+
+    @cached_property
+    def tree(self) -> BoxTree:
+        """Boxes round the triangles of the whole base."""
+        return build_tree(self.base.columns)
 
     @cached_property
     def perimeter(self) -> float:

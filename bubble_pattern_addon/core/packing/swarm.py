@@ -13,6 +13,7 @@ from scipy.sparse import csc_array
 
 from ..isometries import image_of
 from ..mesh import Bools, Floats, Ints
+from ..progress import Snapshot
 from ..surface import Spots, positions, to_frame, walk
 from .bubbles import Bubbles, Ground, can_move, joined
 from .force import Law, Pairs, find_pairs, renewed_pairs
@@ -102,6 +103,12 @@ def swarm_of(ground: Ground, bubbles: Bubbles, pitch: Floats) -> Swarm:
     )
 
 
+def snapshot(swarm: Swarm) -> Snapshot:
+    """The bubbles as they are now."""
+    n = len(swarm.bubbles)
+    return Snapshot(swarm.points[:n].copy(), swarm.normal[:n].copy(), swarm.pitch[:n].copy())
+
+
 def follow(swarm: Swarm) -> None:
     """Bring the followers to where their leaders' images are, and who stays on a plane back onto it."""
     symmetry = swarm.ground.symmetry
@@ -175,10 +182,15 @@ def pull_on(swarm: Swarm, links: Links, law: Law) -> Floats:
     away *= (law(distance * links.softness) * links.softness / np.maximum(distance, 1e-300))[:, None]
     pull = (links.incidence @ away)[:-1]
     pull *= links.pitch
+    along_surface(swarm, active, pull)
+    return pull
+
+
+def along_surface(swarm: Swarm, active: Ints, vectors: Floats) -> None:
+    """Take from the `vectors` (a, 3) of the active bubbles what is square to the surface where they stand."""
     if not swarm.ground.charts.region.flat:
         normal = swarm.normal[active]
-        pull -= np.einsum("nc,nc->n", pull, normal)[:, None] * normal
-    return pull
+        vectors -= np.einsum("nc,nc->n", vectors, normal)[:, None] * normal
 
 
 def move(swarm: Swarm, links: Links, steps: Floats, longest: float) -> None:
