@@ -198,7 +198,7 @@ def test_settings_and_recipe_are_the_same_thing(pattern: bpy.types.Object, syste
 # -- Solve For -------------------------------------------------------------------------------------------
 
 
-def test_the_diameter_is_found_for_an_open_area_and_undone_in_one_step(pattern: bpy.types.Object) -> None:
+def test_the_diameter_is_found_for_an_open_area(pattern: bpy.types.Object) -> None:
     settings = pattern.bubble_pattern
     settings.solve_open_area = 30.0
     places = points(pattern)
@@ -209,6 +209,24 @@ def test_the_diameter_is_found_for_an_open_area_and_undone_in_one_step(pattern: 
     assert np.allclose(points(pattern), places, atol=1e-7)
     assert not is_outdated(settings)
     assert settings.live
+
+
+def test_undo_takes_back_what_was_found_and_what_was_laid(pattern: bpy.types.Object) -> None:
+    name = pattern.name
+    settings = pattern.bubble_pattern
+    settings.solve_for, settings.solve_count = 'COUNT', 100
+    before = settings.count
+    bpy.ops.ed.undo_push(message="before")
+    assert bpy.ops.bubble_pattern.solve() == {'FINISHED'}
+    bpy.ops.ed.undo_push(message="Solve")
+    bpy.ops.ed.undo()
+    back = bpy.data.objects[name]
+    assert back.bubble_pattern.count == len(back.data.vertices) == before
+    assert back.bubble_pattern.pitch == pytest.approx(4 * MM)
+    bpy.ops.ed.redo()
+    again = bpy.data.objects[name]
+    assert abs(len(again.data.vertices) - 100) <= 1
+    assert not is_outdated(again.bubble_pattern)
 
 
 def test_the_pitch_is_found_for_a_count(pattern: bpy.types.Object) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from bubble_pattern_addon.core.density import mass
 from bubble_pattern_addon.core.distance import boundary_distance
 from bubble_pattern_addon.core.errors import RecipeError
 from bubble_pattern_addon.core.fields import Linear
-from bubble_pattern_addon.core.floors import broken_rules, floors_of
+from bubble_pattern_addon.core.floors import Floors, broken_rules, floors_of
 from bubble_pattern_addon.core.limits import limited_by
 from bubble_pattern_addon.core.metric import Constant
 from bubble_pattern_addon.core.nominal import SERIES, next_above, nominal_sizes, snapped
@@ -54,6 +55,11 @@ def millimetre(unit: Unit | None) -> float:
 def packed(region: Region, **recipe: object) -> Pattern:
     whole = Recipe(packing=Packing(pitch=Constant(PITCH)), shaping=Shaping(GRADED))
     return drive(pattern_steps(region, replace(whole, **recipe)))  # type: ignore[arg-type]
+
+
+@cache
+def graded() -> Pattern:
+    return packed(SHEET)
 
 
 def in_plane(points: list[tuple[float, float]], diameters: list[float]) -> Pattern:
@@ -134,6 +140,25 @@ def test_limits_that_ask_for_more_than_the_process_count(process: str) -> None:
         [60] * 2,
         [70] * 2,
     )
+
+
+@settings(max_examples=20, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 10_000), most=st.floats(0.5, 4.0))
+def test_floors_hold_at_every_feature_of_its_own(seed: int, most: float) -> None:
+    """As on a wall of varying thickness: of two neighbours the one that asks for more decides."""
+    bubbles, chance = graded(), np.random.default_rng(seed)
+    n = len(bubbles)
+    bubbles = replace(bubbles, diameter=chance.uniform(1.0, 7.0, n))
+    floors = Floors(*(chance.uniform(0.0, most, n) for _ in range(4)))
+    pattern = limited_by(bubbles, SHEET, floors)
+    kept = floors.take(np.searchsorted(bubbles.ids, pattern.ids))
+    gap = np.linalg.norm(pattern.position[:, None] - pattern.position[None], axis=2)
+    web = gap - (pattern.diameter[:, None] + pattern.diameter[None]) / 2 + 1e9 * np.eye(len(pattern))
+    assert (web >= np.maximum(kept.web[:, None], kept.web[None]) * (1 - 1e-9)).all()
+    margin = boundary_distance(pattern.position, SHEET.boundary_segments) - pattern.diameter / 2
+    assert (margin >= kept.margin * (1 - 1e-9)).all()
+    assert (pattern.diameter >= kept.diameter * (1 - 1e-6)).all()
+    assert not broken_rules(pattern, SHEET, kept)
 
 
 def test_a_deep_blind_feature_must_be_wide() -> None:
@@ -224,7 +249,7 @@ def test_a_process_that_leaves_nothing_is_told_with_its_lengths() -> None:
     ),
 )
 def test_every_feature_is_the_nearest_smaller_nominal_size(sizes: list[float], limits: Limits) -> None:
-    bubbles = packed(SHEET)
+    bubbles = graded()
     wished = replace(bubbles, diameter=bubbles.wished)
     floors, allowed = floors_of(wished, SHEET, limits), np.unique(sizes)
     pattern = limited_by(wished, SHEET, floors, allowed)
@@ -240,6 +265,14 @@ def test_every_feature_is_the_nearest_smaller_nominal_size(sizes: list[float], l
     alike = np.isin(plain.ids, pattern.ids)
     if alike.sum() == kept.sum() and len(plain) == len(pattern):
         assert (next_size > plain.diameter).all()
+
+
+def test_what_is_only_snapped_was_not_made_smaller_by_limits() -> None:
+    free = packed(SHEET, shaping=Shaping(GRADED, sizes="drills 1"))
+    assert not len(free.shrunk)
+    tight = packed(SHEET, shaping=Shaping(GRADED, sizes="drills 1"), limits=Limits(min_web=1.5))
+    assert 0 < len(tight.shrunk) < len(tight)
+    assert tight.diameter.max() == 4.0
 
 
 def test_snapping_forgives_rounding_and_drops_what_is_too_small() -> None:
