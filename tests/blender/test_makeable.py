@@ -152,8 +152,11 @@ def test_nominal_sizes(pattern: bpy.types.Object) -> None:
     sizes = np.unique(np.round(points(pattern, "diameter") / MM, 5))
     assert sizes.tolist() == [1.0, 1.5, 2.0, 2.5, 3.0]
     rows = nominal_rows(bpy.context, settings)
-    assert [name for name, _ in rows] == ["1 mm", "1.5 mm", "2 mm", "2.5 mm", "3 mm"]
+    assert [name for name, _ in rows] == [f"Size {size} mm" for size in ("1", "1.5", "2", "2.5", "3")]
     assert sum(int(count) for _, count in rows) == settings.count
+    settings.sizes = 'DRILLS_01'
+    ((name, count),) = nominal_rows(bpy.context, settings)
+    assert (name, int(count)) == ("Sizes", len(np.unique(np.round(points(pattern, "diameter") / MM, 5))))
 
 
 def test_a_list_of_sizes_is_in_the_scenes_unit(pattern: bpy.types.Object) -> None:
