@@ -22,14 +22,16 @@ import numpy as np
 
 from .core.errors import BaseError, FieldError, OutputError, PatternError
 from .core.export import make_report, write_features, write_report
-from .core.field_tables import Wanted, wanted, with_images
+from .core.feature_recipe import nouns
+from .core.field_tables import Wanted
 from .core.files import LoadedBase, load_base, output_folder, write_mesh
-from .core.mesh import Bools, Floats
+from .core.mesh import Bools, Floats, Mesh
 from .core.pattern import Pattern
 from .core.pipeline import pattern_steps
 from .core.progress import Progress, Result, Steps, drive, within
 from .core.recipe import Recipe, default_recipe
 from .core.recipe_file import load_recipe, recipe_to_toml
+from .core.recipe_names import recipe_names, with_recipe_images
 from .core.region import Region, make_region
 from .core.selection import select, sub_regions
 from .core.sides import check_one_side
@@ -84,6 +86,10 @@ class BlenderSide(Protocol):
         """The pixels of an image file, or of the open file's image of that name."""
         ...
 
+    def read_stamp(self, name: str) -> Mesh:
+        """The object of the open file with that name, in its own coordinates."""
+        ...
+
     def write_blend(self, path: Path, run: Run) -> None:
         """A .blend that opens with the base, the editable pattern and the part."""
         ...
@@ -109,17 +115,17 @@ def run_steps(base: LoadedBase, recipe_file: Path) -> Steps[Run]:
     region = make_region(base.mesh, selected, parts, choice.gap)
     recipe = load_recipe(recipe_file, default_recipe(region.area, region.perimeter))
     sound_base(base.mesh)  # step 3 looks again; but nobody shall wait for a packing to be told of a hole
-    if recipe.feature.depth is None:
+    if recipe.feature.through:
         check_one_side(base.mesh, selected)
     surroundings = surroundings_of(base, read_images(recipe, recipe_file.parent))
     clock.stop("region")
-    solved = None
+    stamp, solved = read_stamp(recipe, recipe_file.parent), None
     if recipe.solve:
         solved = yield from clock.timed(within(solving_steps(region, recipe, surroundings), 0.0, 0.5))
         recipe, pattern = solved.recipe, solved.pattern
     else:
         pattern = yield from clock.timed(within(pattern_steps(region, recipe, surroundings), 0.0, 0.5))
-    part = yield from within(part_steps(base.mesh, pattern, recipe.feature), 0.5, 1.0)
+    part = yield from within(part_steps(base.mesh, pattern, recipe.feature, stamp), 0.5, 1.0)
     clock.stop("add")
     report = make_report(region, pattern, part, clock.seconds, recipe, solved)
     if part.check.problems:
@@ -132,7 +138,7 @@ def read_images(recipe: Recipe, folder: Path) -> dict[str, Floats]:
 
     Raises FieldError where one cannot be read, or this Python has no Blender in it.
     """
-    names = sorted(wanted(recipe.packing.pitch, recipe.shaping.diameter).images)
+    names = sorted(recipe_names(recipe).images)
     if not names:
         return {}
     try:
@@ -143,6 +149,24 @@ def read_images(recipe: Recipe, folder: Path) -> dict[str, Floats]:
             "`blender -b -P scripts/pattern_batch.py -- ...`"
         ) from None
     return {name: side.read_image(name, folder) for name in names}
+
+
+def read_stamp(recipe: Recipe, folder: Path) -> Mesh | None:
+    """The mesh that the recipe's features are, None where they are none: a file seen from `folder`, or else
+    an object of the .blend that is open.
+
+    Raises BaseError where there is neither.
+    """
+    name = recipe.feature.mesh
+    if name is None:
+        return None
+    if (folder / name).is_file():
+        return load_base(folder / name).mesh
+    try:
+        side = blender_side()
+    except OutputError:
+        raise BaseError(f"[feature] mesh: {folder / name} does not exist: check the path") from None
+    return side.read_stamp(name)
 
 
 def surroundings_of(base: LoadedBase, images: Mapping[str, Floats]) -> Surroundings:
@@ -192,7 +216,7 @@ def write_run(run: Run, folder: Path, blender: Callable[[], BlenderSide]) -> Non
         write_mesh(folder / f"part.{name}", run.part.mesh)
     write_features(folder / "features.csv", run.pattern)
     write_report(folder / "report.json", run.report)
-    recipe = with_copied_images(run, folder)
+    recipe = with_copied_files(run, folder)
     (folder / "recipe.toml").write_text(recipe_to_toml(recipe), encoding="utf-8")
     if run.recipe.output.blend:
         blender().write_blend(folder / "pattern.blend", run)
@@ -200,19 +224,21 @@ def write_run(run: Run, folder: Path, blender: Callable[[], BlenderSide]) -> Non
         blender().write_picture(folder / "part.png", run)
 
 
-def with_copied_images(run: Run, folder: Path) -> Recipe:
-    """The recipe with the image files that it names copied beside it: there it makes the same part."""
-    packing, shaping = run.recipe.packing, run.recipe.shaping
+def with_copied_files(run: Run, folder: Path) -> Recipe:
+    """The recipe with the files that it names, images and a mesh, copied beside it: there it makes the same
+    part.
+    """
     names: dict[str, str] = {}
-    for number, name in enumerate(sorted(wanted(packing.pitch, shaping.diameter).images), 1):
+    for number, name in enumerate(sorted(recipe_names(run.recipe).images), 1):
         if (run.origin / name).is_file():  # else it is in the .blend
             names[name] = f"image_{number}{Path(name).suffix}"
             shutil.copyfile(run.origin / name, folder / names[name])
-    return replace(
-        run.recipe,
-        packing=replace(packing, pitch=with_images(packing.pitch, names)),
-        shaping=replace(shaping, diameter=with_images(shaping.diameter, names)),
-    )
+    recipe = with_recipe_images(run.recipe, names)
+    mesh = recipe.feature.mesh
+    if mesh is not None and (run.origin / mesh).is_file():
+        shutil.copyfile(run.origin / mesh, folder / f"feature{Path(mesh).suffix}")
+        recipe = replace(recipe, feature=replace(recipe.feature, mesh=f"feature{Path(mesh).suffix}"))
+    return recipe
 
 
 def blender_side() -> BlenderSide:
@@ -289,7 +315,7 @@ def main(
     try:
         recipe = load_recipe(options.recipe)  # nonsense is told before a long read
         with hushed():
-            names = wanted(recipe.packing.pitch, recipe.shaping.diameter)
+            names = recipe_names(recipe)
             base = read_base(options.base, in_blender, names)
         with output_folder(options.out) as folder:
             run = drive(run_steps(base, options.recipe), show)
@@ -320,11 +346,13 @@ def summary(run: Run, out: Path) -> str:
     webs = "" if figures["min_web"] is None else f", smallest web {figures['min_web']:.3g}"
     limits = figures["limits"]
     cut = "".join(f", {limits[key]:,} {key}" for key in ("shrunk", "dropped") if limits[key])
+    share = "open" if figures["kind"] == "hole" else "covered"
     rules = "".join(
         f", {len(rule['ids']):,} break{'s' if len(rule['ids']) == 1 else ''} the {rule['rule']} rule"
         for rule in figures["broken"]
     )
     return (
-        f"{figures['features']:,} holes, {100 * figures['open_area']:.1f} % open{webs}{cut}{rules}; "
+        f"{nouns(figures['kind'], figures['features'])}, {100 * figures['open_area']:.1f} % {share}"
+        f"{webs}{cut}{rules}; "
         f"watertight part in {out / 'part.stl'}"
     )

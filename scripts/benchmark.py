@@ -377,6 +377,20 @@ def blender(repeats: int) -> None:
     inside.clear()
 
 
+def preview(repeats: int) -> None:
+    """How long the pattern takes to follow a setting in Blender."""
+    if not installed("bpy"):
+        return
+    from scripts import benchmark_preview
+
+    cases = [
+        ("curved panel", curved_slab(), 6.5),
+        ("curved panel", curved_slab(), 2.15),
+        ("curved panel, scan-fine", curved_slab(400), 6.5),
+    ]
+    benchmark_preview.preview(cases, 2 * repeats + 1)
+
+
 def as_manifold(mesh: Mesh) -> manifold3d.Manifold:
     """A mesh as it is, as a manifold."""
     return manifold3d.Manifold(
@@ -435,6 +449,7 @@ SECTIONS: dict[str, Callable[[int], None]] = {
     "graded": graded,
     "adding": adding,
     "blender": blender,
+    "preview": preview,
 }
 
 

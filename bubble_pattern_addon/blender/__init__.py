@@ -2,9 +2,35 @@
 
 from __future__ import annotations
 
-from . import command, fixed_sizes, offenders, operators, overlay, panels, properties, solving, versioning
+from . import (
+    command,
+    fixed_sizes,
+    live,
+    offenders,
+    operators,
+    overlay,
+    panels,
+    properties,
+    runs,
+    solving,
+    versioning,
+    watching,
+)
 
-MODULES = (properties, operators, fixed_sizes, solving, offenders, panels, versioning, overlay, command)
+MODULES = (
+    properties,
+    watching,
+    runs,
+    live,
+    operators,
+    fixed_sizes,
+    solving,
+    offenders,
+    panels,
+    versioning,
+    overlay,
+    command,
+)
 
 
 def register() -> None:

@@ -8,14 +8,18 @@ from ..core.errors import PatternError, RegionError
 from ..core.pattern import joined
 from ..core.progress import Progress, Steps
 from ..core.sides import check_one_side
-from ..core.solid import Part, part_steps
-from .generation import read_source, show_part, update_steps
+from ..core.solid import Part, Plan, cutting_seconds, part_steps
+from .feature_objects import stamp_of
+from .generation import show_part, update_steps
+from .live import has_window
 from .part_mesh import build_part_mesh
 from .pattern_object import read_pattern
 from .properties import in_scene, pattern_objects
 from .provenance import Original, read_original
 from .reading import Base, evaluated_mesh, read_base, shown
 from .settings_recipe import is_outdated, recipe_of
+from .sources import read_source
+from .stepping import PATIENCE
 
 
 def apply_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[tuple[bpy.types.Object, Part]]:
@@ -26,17 +30,17 @@ def apply_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[tupl
     Raises PatternError, BaseError where the base is not fit for a solid.
     """
     base_object = obj.bubble_pattern.base
-    owners = pattern_objects(base_object)
+    owners = applied_with(obj)
     feature = recipe_of(obj.bubble_pattern).feature
     if any(recipe_of(owner.bubble_pattern).feature != feature for owner in owners):
         raise PatternError(
-            f'The patterns on "{base_object.name}" have holes of different kinds: give them the same depth '
-            "and sides, or apply one, and add the other to the part"
+            f'The patterns on "{base_object.name}" have different features: give them the same ones, or '
+            "apply one, and add the other to the part"
         )
     for owner in owners:
         settings = owner.bubble_pattern
         source = read_source(base_object, settings.region, context, recipe_of(settings))
-        if feature.depth is None:
+        if feature.through:
             check_one_side(source.base.mesh, source.selected)
         now = (source.fingerprint, source.size_trace)
         if now != (settings.fingerprint, settings.size_trace) or is_outdated(settings):
@@ -45,7 +49,8 @@ def apply_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[tupl
     pattern = joined([read_pattern(owner, base.mesh) for owner in owners])
     if not len(pattern):
         raise RegionError("The pattern has no features: make the pitch smaller or the region larger")
-    part = yield from part_steps(base.mesh, pattern, feature)
+    stamp = stamp_of(feature, context)
+    part = yield from part_steps(base.mesh, pattern, feature, stamp, is_long if has_window() else None)
     yield Progress("Building the part", 1.0)
     mesh = build_part_mesh(
         f"{base_object.name} Part", part, pattern.places, base, original, obj.bubble_pattern.wall_material
@@ -53,6 +58,24 @@ def apply_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[tupl
     for owner in owners:
         owner.bubble_pattern.part_removed = part.check.removed_volume
     return place_part(base_object, owners, mesh, verdict_of(part), context), part
+
+
+def applied_with(obj: bpy.types.Object) -> list[bpy.types.Object]:
+    """The patterns that are applied when `obj` is: one for each region of its base, in the order of names.
+
+    A duplicate of a pattern is a variant, in the same region: `obj` stands for its own, the first that is
+    shown for another.
+    """
+    on_base = pattern_objects(obj.bubble_pattern.base)
+    chosen: dict[str, bpy.types.Object] = {}
+    for other in sorted(on_base, key=lambda other: (other != obj, other.hide_get(), other.name)):
+        chosen.setdefault(other.bubble_pattern.region, other)
+    return sorted(chosen.values(), key=lambda other: other.name)
+
+
+def is_long(plan: Plan) -> bool:
+    """Whether a designer would take Blender for dead while this is cut."""
+    return cutting_seconds(plan) > PATIENCE
 
 
 def read_whole(obj: bpy.types.Object, context: bpy.types.Context) -> tuple[Base, Original]:

@@ -6,7 +6,6 @@ writes.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -17,7 +16,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import BaseError, OutputError
-from ..core.field_tables import NO_NAMES, Wanted, wanted, with_images
+from ..core.field_tables import NO_NAMES, Wanted
 from ..core.files import LoadedBase
 from ..core.mesh import Bools, Floats, Mesh
 from ..core.metric import Places
@@ -25,9 +24,11 @@ from ..core.moving import moved_recipe
 from ..core.pattern import Pattern
 from ..core.quality import measure
 from ..core.recipe import Recipe
+from ..core.recipe_names import recipe_names, with_recipe_images
 from .applying import place_part, verdict_of
 from .attributes import CORNER_VERTEX, MATERIAL, write_values
-from .generation import fill_settings, measured, put, read_source
+from .feature_objects import read_stamp as read_object_stamp
+from .generation import fill_settings, measured, put
 from .marked_side import on_marked_side
 from .part_mesh import build_part_mesh
 from .pattern_object import new_pattern_object
@@ -39,6 +40,7 @@ from .provenance import Original, read_original
 from .reading import Base, evaluated_mesh, transformed, world_frame
 from .reading import read_base as read_object
 from .settings_recipe import recipe_of
+from .sources import read_source
 from .surroundings import read_painted, with_things
 from .target_region import ATTRIBUTE, store, stored
 
@@ -123,6 +125,11 @@ def base_object() -> bpy.types.Object:
     raise BaseError(f"The .blend has {len(meshes)} mesh objects ({names}): make the base active, and save")
 
 
+def read_stamp(name: str) -> Mesh:
+    """The object of the open file with that name, as a feature."""
+    return read_object_stamp(name, bpy.context)
+
+
 # -- out -----------------------------------------------------------------------------------------------------
 
 
@@ -143,9 +150,8 @@ def write_blend(path: Path, run: Run) -> None:
         fill_settings(pattern_obj, base_obj, region, moved_recipe(with_images_in(run), to_frame, run.region))
         recipe = recipe_of(pattern_obj.bubble_pattern)
         source = read_source(base_obj, region, bpy.context, recipe)
-        start = time.perf_counter()
         own = moved(run.pattern, to_frame)
-        laid = measured(own, source.region, recipe, measure(own, source.region), start)
+        laid = measured(own, source.region, recipe, measure(own, source.region))
         laid = replace(laid, seconds=run.report["seconds"]["pack"])
         put(pattern_obj, source, recipe, laid)
         mesh = build_part_mesh(f"{base_obj.name} Part", run.part, run.pattern.places, base, original)
@@ -158,20 +164,15 @@ def write_blend(path: Path, run: Run) -> None:
 
 def with_images_in(run: Run) -> Recipe:
     """The recipe with the image files that it names taken into the open file, under names that fit there."""
-    packing, shaping = run.recipe.packing, run.recipe.shaping
     names: dict[str, str] = {}
-    for name in sorted(wanted(packing.pitch, shaping.diameter).images):
+    for name in sorted(recipe_names(run.recipe).images):
         if (run.origin / name).is_file():
             image = load_image(run.origin / name)
             image.name = Path(name).name
             image.pack()
             image.use_fake_user = True  # a field that is kept as text does not hold it
             names[name] = image.name
-    return replace(
-        run.recipe,
-        packing=replace(packing, pitch=with_images(packing.pitch, names)),
-        shaping=replace(shaping, diameter=with_images(shaping.diameter, names)),
-    )
+    return with_recipe_images(run.recipe, names)
 
 
 def write_picture(path: Path, run: Run, size: tuple[int, int] = SIZE, up: Floats | None = None) -> None:

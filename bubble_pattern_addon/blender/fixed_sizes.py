@@ -69,11 +69,11 @@ def keep(settings: Any, seeds: list[tuple[Any, float]]) -> None:
 
 def bubbles_of(obj: bpy.types.Object, context: bpy.types.Context) -> tuple[Floats, Floats, Ints]:
     """Places (n, 3) of the pattern's bubbles, their diameters (n,), and the rows of the selected ones."""
-    from . import generation
     from .pattern_object import point_ids, read_pattern
+    from .sources import read_source
 
     settings = obj.bubble_pattern
-    source = generation.read_source(settings.base, settings.region, context)
+    source = read_source(settings.base, settings.region, context)
     bubbles = all_bubbles(read_pattern(obj, source.base.mesh))
     chosen = point_ids(obj)[read_values(obj.data.vertices, "select", np.bool_)]
     return bubbles.position, bubbles.diameter, np.flatnonzero(np.isin(bubbles.ids, chosen))

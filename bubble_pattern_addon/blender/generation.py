@@ -8,35 +8,30 @@ so a cancelled or failed run leaves nothing behind.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import bpy
 
 from ..core.errors import PatternError
-from ..core.field_tables import Wanted, wanted
-from ..core.mesh import Bools
 from ..core.pattern import Pattern
 from ..core.pipeline import pattern_steps
-from ..core.progress import Progress, Steps, drive
+from ..core.progress import Progress, Result, Steps, drive
 from ..core.quality import Quality, measure
 from ..core.recipe import Recipe, RegionChoice, default_recipe
 from ..core.recipe_file import recipe_from_dict
-from ..core.region import Region, make_region
+from ..core.region import Region
 from ..core.results import Results, results_of
-from ..core.selection import select, sub_regions
 from ..core.shaping import reshaped
-from ..core.surroundings import Surroundings
-from .marked_side import on_marked_side
+from . import live, runs
 from .noting import note_quality, note_results, noted_quality
 from .pattern_object import read_pattern, write_pattern, write_sizes
 from .preview_nodes import show_preview
 from .properties import SETTINGS_VERSION, in_scene, pattern_objects
-from .reading import Base, evaluated_mesh, read_base, shown
 from .settings_recipe import packing_text, recipe_of, recipe_text, spoken, take_recipe
-from .surroundings import both, read_painted, trace, with_things
+from .sources import Source, read_source
 
-# A pattern that took longer than this is not laid anew at every change of a setting.
+# Without a window, a pattern that took longer than this is not laid anew at every change of a setting.
 LIVE_SECONDS = 1.0
 
 
@@ -47,54 +42,7 @@ class Laid:
     pattern: Pattern
     quality: Quality
     results: Results
-    seconds: float
-
-
-@dataclass(frozen=True)
-class Source:
-    """A base as read for one pattern: geometry, region, the region's triangles as a mask (T,), what fields
-    ask for, and what tells whether any of them has changed: for the bubbles' places, and for their sizes.
-    """
-
-    base: Base
-    region: Region
-    selected: Bools
-    surroundings: Surroundings
-    fingerprint: str
-    size_trace: str
-
-
-def read_source(
-    obj: bpy.types.Object, attribute: str, context: bpy.types.Context, recipe: Recipe | None = None
-) -> Source:
-    """Read the base `obj` with its modifiers, its target region from the face attribute of that name, and
-    what the fields of `recipe` ask for.
-
-    Raises RegionError where no face carries the attribute, BaseError where the object has no usable mesh.
-    """
-    pitch_names, size_names = (Wanted(), Wanted()) if recipe is None else names_of(recipe)
-    names = both(pitch_names, size_names)
-    with shown(obj, context), evaluated_mesh(obj, context.evaluated_depsgraph_get()) as mesh:
-        base = read_base(obj, mesh)
-        painted = read_painted(obj, mesh, base, names)
-    surroundings = with_things(painted, names, base.frame, context)
-    choice = RegionChoice(attribute=attribute) if recipe is None else recipe.region
-    selected = select(base.mesh, RegionChoice(attribute=attribute), base.attributes)
-    selected = on_marked_side(obj, base, attribute, selected)
-    parts = sub_regions(choice, base.attributes, base.materials)
-    return Source(
-        base,
-        make_region(base.mesh, selected, parts, choice.gap),
-        selected,
-        surroundings,
-        base.fingerprint(selected, parts) + trace(surroundings, pitch_names),
-        trace(surroundings, size_names),
-    )
-
-
-def names_of(recipe: Recipe) -> tuple[Wanted, Wanted]:
-    """What the packing metric asks its surroundings for, and what the shaping metric does."""
-    return wanted(recipe.packing.pitch), wanted(recipe.shaping.diameter)
+    seconds: float = 0.0
 
 
 def fitting_recipe(
@@ -116,15 +64,29 @@ def fitting_recipe(
 
 def laying_steps(source: Source, recipe: Recipe) -> Steps[Laid]:
     """Steps 1 and 2 and their figures."""
-    start = time.perf_counter()
-    pattern = yield from pattern_steps(source.region, recipe, source.surroundings)
+    packing = pattern_steps(source.region, recipe, source.surroundings)
+    pattern, seconds = yield from timed(packing)
     yield Progress("Measuring", 1.0)
-    return measured(pattern, source.region, recipe, measure(pattern, source.region), start)
+    laid = measured(pattern, source.region, recipe, measure(pattern, source.region))
+    return replace(laid, seconds=seconds)
 
 
-def measured(pattern: Pattern, region: Region, recipe: Recipe, quality: Quality, start: float) -> Laid:
-    """`pattern` with its figures; `start` is when work on it began."""
-    return Laid(pattern, quality, results_of(pattern, region, recipe), time.perf_counter() - start)
+def timed(steps: Steps[Result]) -> Steps[tuple[Result, float]]:
+    """Pass `steps` on; returns their result, and the seconds that they took without the pauses between."""
+    seconds = 0.0
+    while True:
+        start = time.perf_counter()
+        try:
+            progress = next(steps)
+        except StopIteration as end:
+            return end.value, seconds + time.perf_counter() - start
+        seconds += time.perf_counter() - start
+        yield progress
+
+
+def measured(pattern: Pattern, region: Region, recipe: Recipe, quality: Quality) -> Laid:
+    """`pattern` with its figures."""
+    return Laid(pattern, quality, results_of(pattern, region, recipe))
 
 
 def put(obj: bpy.types.Object, source: Source, recipe: Recipe, laid: Laid) -> None:
@@ -143,7 +105,8 @@ def note(settings: Any, source: Source, recipe: Recipe, laid: Laid) -> None:
     settings.fingerprint = source.fingerprint
     settings.size_trace = source.size_trace
     settings.version = SETTINGS_VERSION
-    settings.trouble = ""
+    settings.trouble = settings.cut_trouble = ""
+    live.note_base(settings.id_data)
     settings.shrunk = len(laid.pattern.shrunk)
     settings.dropped = 0 if laid.pattern.dropped is None else len(laid.pattern.dropped)
     settings.notes = " ".join(laid.pattern.notes)
@@ -152,34 +115,44 @@ def note(settings: Any, source: Source, recipe: Recipe, laid: Laid) -> None:
 
 def update_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[None]:
     """Lay the pattern of `obj` anew by its settings, on its base as it is now."""
-    settings = obj.bubble_pattern
-    recipe = recipe_of(settings)
+    recipe = recipe_of(obj.bubble_pattern)
     yield Progress("Reading the base", 0.0)
+    settings = obj.bubble_pattern  # asked for anew after every pause: what stood there may be elsewhere
     source = read_source(settings.base, settings.region, context, recipe)
     laid = yield from laying_steps(source, recipe)
     put(obj, source, recipe, laid)
 
 
 def react(settings: Any, context: bpy.types.Context, repack: bool) -> None:
-    """Answer a change of a setting in the panel: lay or shape the pattern anew where that is quick.
-
-    It happens within the change, so that one undo takes back both.
-    """
+    """Answer a change of a setting in the panel: lay or shape the pattern anew; see live."""
     obj = settings.id_data
-    if (
-        not settings.live
-        or not in_scene(settings.base)
-        or 'EDIT' in (settings.base.mode, obj.mode)
-        or not settings.made_with
-    ):
+    if not answers(settings, context):
         return
     try:
         if not repack and is_only_shape(settings):
+            runs.stop()
             reshape(obj, context)
+        elif live.has_window():
+            live.lay(obj, context, update_steps(obj, context), settings.seconds)
         elif settings.seconds <= LIVE_SECONDS:
             drive(update_steps(obj, context))
     except PatternError as error:
         settings.trouble = spoken(error, context)
+
+
+def answers(settings: Any, context: bpy.types.Context) -> bool:
+    """Whether the pattern follows its settings, and can."""
+    obj, base = settings.id_data, settings.base
+    return (
+        settings.live
+        and bool(settings.made_with)
+        and in_scene(base)
+        and in_scene(obj)
+        and obj.is_editable
+        and base.name in context.view_layer.objects
+        and 'EDIT' not in base.mode
+        and 'EDIT' not in obj.mode
+    )
 
 
 def is_only_shape(settings: Any) -> bool:
@@ -191,13 +164,12 @@ def reshape(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     """Give the features the sizes that the settings want, on the bubbles that are there."""
     settings = obj.bubble_pattern
     recipe = recipe_of(settings)
-    start = time.perf_counter()
     source = read_source(settings.base, settings.region, context, recipe)
     if source.fingerprint != settings.fingerprint:
         drive(update_steps(obj, context))
         return
     pattern = reshaped(read_pattern(obj, source.base.mesh), source.region, recipe, source.surroundings)
-    laid = measured(pattern, source.region, recipe, noted_quality(settings), start)
+    laid = measured(pattern, source.region, recipe, noted_quality(settings))
     write_sizes(obj, pattern)
     note(settings, source, recipe, laid)
 

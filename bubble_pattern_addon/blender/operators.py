@@ -12,6 +12,7 @@ import bpy
 from bpy.props import BoolProperty, FloatProperty
 
 from ..core.progress import Progress, Steps
+from .cut_preview import hide_cut
 from .field_properties import length_property, typed
 from .properties import in_scene, is_pattern, pattern_objects, pattern_of
 from .settings_recipe import recipe_of
@@ -56,6 +57,11 @@ SIZE_OR_NONE = {"min": 0.0, "soft_max": 10.0, "options": {'SKIP_SAVE'}}
 class OnPattern:
     """Mixin for an operator on a pattern, in Object Mode."""
 
+    def stands(self, context: bpy.types.Context) -> bool:
+        """Whether the pattern is still there with its base."""
+        obj = pattern_of(context.active_object)
+        return obj is not None and in_scene(obj) and in_scene(obj.bubble_pattern.base)
+
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return poll_pattern(cls, context) and poll_object_mode(cls, context)
@@ -63,6 +69,10 @@ class OnPattern:
 
 class LayingOperator(SteppedOperator):
     """Mixin for an operator that lays a pattern: its steps end with the pattern's object."""
+
+    def settles_on(self, context: bpy.types.Context) -> bpy.types.Object | None:
+        obj = pattern_of(context.active_object)
+        return context.active_object if obj is None else obj.bubble_pattern.base
 
     def done(self, context: bpy.types.Context, result: bpy.types.Object) -> None:
         """Say how many features there are."""
@@ -115,6 +125,7 @@ class BUBBLE_PATTERN_OT_add(LayingOperator, bpy.types.Operator):
     def steps(self, context: bpy.types.Context) -> Steps[bpy.types.Object]:
         from . import generation
         from .pattern_object import new_pattern_object
+        from .sources import read_source
 
         yield Progress("Reading the base", 0.0)
         base = context.active_object
@@ -122,7 +133,7 @@ class BUBBLE_PATTERN_OT_add(LayingOperator, bpy.types.Operator):
         name = free_name(base)
         with trying_region(base, name):
             store(base, name, wanted_faces(base, name, editing))
-            source = generation.read_source(base, name, context)
+            source = read_source(base, name, context)
             recipe = generation.fitting_recipe(source.region, name, *self.wanted_lengths())
             laid = yield from generation.laying_steps(source, recipe)
             obj = new_pattern_object(base)
@@ -158,6 +169,7 @@ class BUBBLE_PATTERN_OT_update(OnPattern, LayingOperator, bpy.types.Operator):
     bl_idname = "bubble_pattern.update"
     bl_label = "Update"
     bl_options = {'REGISTER', 'UNDO'}
+    heeds_sidebar = True
 
     def steps(self, context: bpy.types.Context) -> Steps[bpy.types.Object]:
         from . import generation
@@ -227,14 +239,18 @@ class BUBBLE_PATTERN_OT_remove(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         from . import generation
+        from .feature_shapes import drop_unused
 
         obj = current_pattern(context)
         settings = obj.bubble_pattern
         base, part, region = settings.base, settings.part, settings.region
         keep = self.keep_part and in_scene(part)
+        if base is not None:
+            hide_cut(base)
         if in_scene(base) and not keep:
             generation.show_part(obj, context, False)
         remove_object(obj)
+        drop_unused()
         if part is not None and not keep:
             remove_object(part)
         if not in_scene(base):

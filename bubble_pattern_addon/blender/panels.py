@@ -6,10 +6,20 @@ from typing import Any
 
 import bpy
 
-from . import feature_panel, limits_panel, packing_panel, region_panel, result_panel, shaping_panel
+from . import (
+    feature_panel,
+    limits_panel,
+    live,
+    packing_panel,
+    region_panel,
+    result_panel,
+    runs,
+    shaping_panel,
+)
 from .properties import in_scene, is_pattern, pattern_objects, pattern_of
 from .settings_recipe import is_outdated
 from .sidebar import SidebarPanel, is_applied, large, sentences
+from .stepping import draw_progress
 
 
 class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
@@ -56,7 +66,11 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
             layout.prop(base.bubble_pattern, "pattern", text="")
         else:
             layout.label(text=obj.name, icon='MOD_PARTICLE_INSTANCE')
-        outdated = bool(settings.trouble) or is_outdated(settings)
+        trouble = settings.trouble or live.trouble_of(obj)
+        outdated = bool(trouble) or is_outdated(settings)
+        run = runs.under_way()
+        if run is not None:
+            draw_progress(layout, run)
         if is_pattern(context.active_object) and context.mode == 'EDIT_MESH':
             self.draw_points(layout, settings)
             return
@@ -70,8 +84,8 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
             row.operator("bubble_pattern.region_edit", icon='FACESEL')
             if not outdated:
                 row.operator("bubble_pattern.update", icon='FILE_REFRESH')
-        if settings.trouble:
-            sentences(layout, settings.trouble, context.region.width, 'ERROR')
+        if trouble:
+            sentences(layout, trouble, context.region.width, 'ERROR')
         if outdated:
             large(layout).operator("bubble_pattern.update", icon='FILE_REFRESH', depress=True)
         (layout.row() if outdated or editing else large(layout)).operator(

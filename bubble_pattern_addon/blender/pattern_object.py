@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 import numpy as np
 from mathutils import Matrix
 
+from ..core.feature_recipe import SIZES
 from ..core.mesh import Floats, Ints, Mesh
 from ..core.metric import Places
-from ..core.pattern import Pattern, all_bubbles, split
+from ..core.pattern import Pattern, aimed, all_bubbles, split, take
 from .attributes import read_values, write_values
+from .preview_nodes import show_shape
 from .reading import Base
 
 
@@ -29,8 +33,7 @@ def write_pattern(obj: bpy.types.Object, pattern: Pattern, base_object: bpy.type
     A bubble whose feature was left out is a point with the diameter 0: a later shaping may bring it back.
     """
     bubbles = all_bubbles(pattern)
-    mesh = obj.data
-    mesh.clear_geometry()
+    mesh = fresh_mesh(obj)
     mesh.vertices.add(len(bubbles))
     write_values(mesh, "position", 'POINT', 'FLOAT_VECTOR', bubbles.position)
     write_values(mesh, "id", 'POINT', 'INT', bubbles.ids)
@@ -38,7 +41,6 @@ def write_pattern(obj: bpy.types.Object, pattern: Pattern, base_object: bpy.type
     write_values(mesh, "row", 'POINT', 'INT', bubbles.row)
     write_values(mesh, "normal", 'POINT', 'FLOAT_VECTOR', bubbles.normal)
     write_values(mesh, "tangent", 'POINT', 'FLOAT_VECTOR', bubbles.tangent)
-    write_values(mesh, "rotation", 'POINT', 'QUATERNION', rotations(bubbles.normal, bubbles.tangent))
     write_values(mesh, "triangle", 'POINT', 'INT', bubbles.places.triangle)
     write_values(mesh, "barycentric", 'POINT', 'FLOAT_VECTOR', bubbles.places.barycentric)
     write_sizes(obj, pattern)
@@ -47,15 +49,58 @@ def write_pattern(obj: bpy.types.Object, pattern: Pattern, base_object: bpy.type
     obj.matrix_basis = Matrix(base.frame.tolist())
 
 
+def fresh_mesh(obj: bpy.types.Object) -> bpy.types.Mesh:
+    """An empty mesh in the place of that of `obj`, under its name.
+
+    Blender's undo takes a mesh that is the same before and after a step for unchanged since, and would keep
+    what was written to it in between; and a linked duplicate of the pattern keeps its own points.
+    """
+    old = obj.data
+    mesh = bpy.data.meshes.new(old.name)
+    obj.data = mesh
+    if not old.users:
+        name = old.name
+        bpy.data.meshes.remove(old)
+        mesh.name = name
+    return mesh
+
+
+def own_mesh(obj: bpy.types.Object) -> bpy.types.Mesh:
+    """The mesh of `obj`, which no other object shows: a linked duplicate keeps its own sizes."""
+    if obj.data.users > 1:
+        obj.data = obj.data.copy()
+    return obj.data
+
+
 def write_sizes(obj: bpy.types.Object, pattern: Pattern) -> None:
     """Give the points of a pattern object the diameters in `pattern`, which has all their ids."""
     bubbles = all_bubbles(pattern)
     row = np.searchsorted(bubbles.ids, point_ids(obj))
     wished = bubbles.diameter if bubbles.wished is None else bubbles.wished
+    own_mesh(obj)
     write_values(obj.data, "diameter", 'POINT', 'FLOAT', bubbles.diameter[row])
     write_values(obj.data, "wished", 'POINT', 'FLOAT', wished[row])
+    write_form(obj.data, take(bubbles, row))
+    show_shape(obj)
     obj.data.update_tag()
     obj.update_tag()
+
+
+def write_form(mesh: bpy.types.Mesh, bubbles: Pattern) -> None:
+    """How the features stand, and their sizes that vary over the region; what all have alike is taken off."""
+    stands = aimed(bubbles)
+    write_values(mesh, "rotation", 'POINT', 'QUATERNION', rotations(stands.normal, stands.tangent))
+    for name in ("axis", "heading"):
+        values = getattr(bubbles, name)
+        if values is not None:
+            write_values(mesh, name, 'POINT', 'FLOAT_VECTOR', values)
+        elif name in mesh.attributes:
+            mesh.attributes.remove(mesh.attributes[name])
+    for name in SIZES:
+        if name in bubbles.sizes:
+            write_values(mesh, name, 'POINT', 'FLOAT', bubbles.sizes[name])
+        elif name in mesh.attributes:
+            mesh.attributes.remove(mesh.attributes[name])
 
 
 def point_ids(obj: bpy.types.Object) -> Ints:
@@ -79,8 +124,13 @@ def read_pattern(obj: bpy.types.Object, mesh: Mesh) -> Pattern:
     triangle = values("triangle", "value", np.int32).astype(np.int64)
     barycentric = values("barycentric", "vector", np.float32, 3).astype(np.float64)
     barycentric /= barycentric.sum(axis=1, keepdims=True)
-    position = (mesh.corners[triangle] * barycentric[:, :, None]).sum(axis=1)
+    position = (mesh.vertices[mesh.triangles[triangle]] * barycentric[:, :, None]).sum(axis=1)
     known = "wished" in points  # files of 0.1 have none
+    ways: dict[str, Any] = {
+        name: unit(values(name, "vector", np.float32, 3).astype(np.float64)) if name in points else None
+        for name in ("axis", "heading")
+    }
+    sizes = {name: values(name, "value", np.float32).astype(np.float64) for name in SIZES if name in points}
     bubbles = Pattern(
         places=Places(position, triangle, barycentric),
         normal=unit(values("normal", "vector", np.float32, 3).astype(np.float64)),
@@ -90,6 +140,8 @@ def read_pattern(obj: bpy.types.Object, mesh: Mesh) -> Pattern:
         row=values("row", "value", np.int32).astype(np.int64),
         wished=values("wished", "value", np.float32).astype(np.float64) if known else None,
         bubble=None if np.array_equal(ids, np.arange(len(ids))) else ids,
+        **ways,
+        sizes=sizes,
     )
     return split(bubbles, bubbles.diameter > 0)
 

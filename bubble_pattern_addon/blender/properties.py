@@ -12,14 +12,14 @@ from .feature_properties import FeatureSettings
 from .field_properties import BubblePatternField
 from .limit_properties import LimitSettings
 from .packing_properties import PackingSettings
-from .reacting import redraw_preview
+from .reacting import redraw_preview, show_cut
 from .region_properties import RegionSettings
 from .result_properties import BubblePatternBroken, ResultSettings
 from .shaping_properties import BubblePatternSeed, ShapingSettings
 from .solve_properties import SolveSettings
 
 # Raised when a property changes its meaning; see upgrade.
-SETTINGS_VERSION = 2
+SETTINGS_VERSION = 3
 
 
 def is_on(settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
@@ -62,8 +62,15 @@ class BubblePatternSettings(
     )
     live: BoolProperty(
         name="Live Update",
-        description="Lay the pattern anew with every change, as long as that takes less than half a second",
+        description="Lay the pattern anew with every change of a setting",
         default=True,
+    )
+    cut_preview: BoolProperty(
+        name="Cut Preview",
+        description="Show the base with its holes before they are made, until a setting or the base changes",
+        default=False,
+        options={'SKIP_SAVE'},
+        update=show_cut,
     )
     show_bubbles: BoolProperty(
         name="Show Bubbles",
@@ -85,7 +92,7 @@ def is_pattern(obj: bpy.types.Object | None) -> bool:
 
 def pattern_objects(base: bpy.types.Object) -> list[bpy.types.Object]:
     """The patterns on `base`, in the order of their names."""
-    return sorted((o for o in base.children if o.bubble_pattern.base == base), key=lambda o: o.name)
+    return sorted((o for o in base.children if is_on(base.bubble_pattern, o)), key=lambda o: o.name)
 
 
 def pattern_of(obj: bpy.types.Object | None) -> bpy.types.Object | None:

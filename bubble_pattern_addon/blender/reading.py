@@ -21,6 +21,8 @@ from .attributes import MATERIAL, face_masks, read_named, read_values
 
 # A linear map that flattens volumes by more than this has lost a direction.
 SINGULAR = 1e-12
+# Scales that agree in so many digits are the same.
+SAME_SCALE = 5
 
 
 @dataclass(frozen=True)
@@ -54,11 +56,19 @@ class Base:
         return np.linalg.inv(self.to_frame)
 
     def fingerprint(self, selected: Bools, parts: Ints | None = None) -> str:
-        """A short name for this very geometry with this target region and its sub-regions (T,)."""
+        """A short name for this very geometry with this target region and its sub-regions (T,).
+
+        It is that of the object's own mesh and of its scale: Blender's matrices are of single precision, and
+        turning the object changes the last bits of its scale.
+        """
         digest = hashlib.blake2b(digest_size=16)
-        arrays = [self.mesh.vertices, self.mesh.triangles, selected]
+        linear = self.to_frame[:3, :3]
+        size = np.linalg.norm(linear)
+        own = transformed(self.mesh.vertices, self.to_local).astype(np.float32)
+        arrays = [own + 0.0, np.round(linear / size, SAME_SCALE) + 0.0, self.mesh.triangles, selected]
         for array in arrays if parts is None else [*arrays, parts]:
             digest.update(np.ascontiguousarray(array).tobytes())
+        digest.update(f"{size:.{SAME_SCALE}g}".encode())
         return digest.hexdigest()
 
 

@@ -30,7 +30,13 @@ class BUBBLE_PATTERN_PT_preview(SettingsPanel, bpy.types.Panel):
     bl_label = "Preview"
     bl_order = 7
     bl_options = {'DEFAULT_CLOSED'}
-    fields = ("live", "show_bubbles")
+    fields = ("live", "show_bubbles", "cut_preview")
+
+    def draw(self, context: bpy.types.Context) -> None:
+        super().draw(context)
+        trouble = shown_settings(context).cut_trouble
+        if trouble:
+            sentences(self.layout, trouble, context.region.width, 'ERROR')
 
 
 class BUBBLE_PATTERN_PT_result(SettingsPanel, bpy.types.Panel):

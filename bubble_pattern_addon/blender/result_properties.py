@@ -38,6 +38,7 @@ class ResultSettings:
     fingerprint: StringProperty(options={'HIDDEN'})
     size_trace: StringProperty(options={'HIDDEN'})
     trouble: StringProperty(options={'HIDDEN'})
+    cut_trouble: StringProperty(options={'HIDDEN'})
     version: IntProperty(options={'HIDDEN'})
     seconds: FloatProperty(options={'HIDDEN'})
     count: IntProperty(name="Features", description="Number of features", options={'HIDDEN'})

@@ -11,9 +11,10 @@ import bpy
 from ..core.blending import Fill
 from ..core.errors import PatternError, RecipeError
 from ..core.metric import Constant, Described
-from ..core.recipe import Feature, Packing, Recipe, RegionChoice, Seed, Shaping
+from ..core.recipe import Packing, Recipe, RegionChoice, Seed, Shaping
 from ..core.recipe_checks import check_recipe
 from ..core.recipe_file import recipe_to_toml
+from .feature_settings import feature_of, placing, take_feature
 from .field_properties import point_of, typed
 from .field_recipe import described, take
 from .making_recipe import limits_of, output_of, shaping_output, sizes_of, take_limits, take_sizes
@@ -22,7 +23,6 @@ from .properties import BubblePatternSettings
 
 def recipe_of(settings: Any) -> Recipe:
     """The recipe that `settings` stand for. Raises RecipeError where they contradict one another."""
-    through = settings.depth_mode == 'THROUGH'
     recipe = Recipe(
         region=RegionChoice(
             attribute=settings.region or None,
@@ -52,11 +52,7 @@ def recipe_of(settings: Any) -> Recipe:
             iterations=settings.shaping_iterations,
             sizes=sizes_of(settings),
         ),
-        feature=Feature(
-            depth=None if through else typed(settings.depth),
-            sides=settings.sides or None,
-            tolerance=typed(settings.facet_tolerance) or None,
-        ),
+        feature=feature_of(settings),
         limits=limits_of(settings),
         output=output_of(settings),
     )
@@ -78,12 +74,7 @@ def take_recipe(settings: Any, recipe: Recipe) -> None:
     settings.gap = recipe.region.gap
     take_packing(settings, recipe.packing)
     take_shaping(settings, recipe.shaping)
-    feature = recipe.feature
-    settings.depth_mode = 'THROUGH' if feature.depth is None else 'BLIND'
-    if feature.depth is not None:
-        settings.depth = feature.depth
-    settings.sides = feature.sides or 0
-    settings.facet_tolerance = feature.tolerance or 0.0
+    take_feature(settings, recipe.feature)
     take_limits(settings, recipe.limits)
     settings.density = recipe.output.density or 0.0
     settings.live = live
@@ -157,7 +148,9 @@ def packing_text(recipe: Recipe) -> str:
 def recipe_text(recipe: Recipe) -> str:
     """What the pattern's points depend on, as text; how the features are cut is left out."""
     # the rules of a process depend on how deep a feature is
-    feature = Feature() if recipe.limits.process is None else Feature(depth=recipe.feature.depth)
+    feature = placing(recipe.feature)
+    if recipe.limits.process is not None:
+        feature = replace(feature, depth=recipe.feature.depth)
     return recipe_to_toml(replace(recipe, feature=feature, output=shaping_output(recipe)))
 
 

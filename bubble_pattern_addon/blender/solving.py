@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 from typing import Any
 
@@ -26,20 +25,21 @@ class BUBBLE_PATTERN_OT_solve(OnPattern, SteppedOperator, bpy.types.Operator):
         from ..core.quality import measure
         from ..core.solving import solving_steps
         from . import generation
+        from .sources import read_source
 
         yield Progress("Reading the base", 0.0)
         obj = current_pattern(context)
         settings = obj.bubble_pattern
         recipe = recipe_of(settings)
-        source = generation.read_source(settings.base, settings.region, context, recipe)
+        source = read_source(settings.base, settings.region, context, recipe)
         asked = replace(recipe, solve=solve_of(settings))
-        start = time.perf_counter()
-        solved = yield from within(solving_steps(source.region, asked, source.surroundings), 0.0, 0.95)
+        solving = solving_steps(source.region, asked, source.surroundings)
+        solved, seconds = yield from generation.timed(within(solving, 0.0, 0.95))
         yield Progress("Measuring", 0.95)
         pattern, region = solved.pattern, source.region
         quality = measure(pattern, region)
-        laid = generation.measured(pattern, region, solved.recipe, quality, start)
-        laid = replace(laid, seconds=laid.seconds / solved.packings)
+        laid = generation.measured(pattern, region, solved.recipe, quality)
+        laid = replace(laid, seconds=seconds / solved.packings)
         take_found(settings, solved)
         generation.put(obj, source, recipe_of(settings), laid)
         return obj, solved

@@ -72,13 +72,14 @@ def floors_of(
     bubbles: Pattern,
     region: Region,
     limits: Limits,
-    depth: float | None = None,
+    depth: Floats | float | None = None,
     millimetre: float = 1.0,
 ) -> Floors:
     """Floors of these bubbles, whatever diameters they have; of the limits alone where the process shall only
     be checked.
 
-    depth: of blind features; None: they go through the near wall; millimetre: in the unit of the base
+    depth: how deep the features go, (n,) or one for all; nan or None: through the near wall; millimetre: in
+    the unit of the base
     """
     n = len(bubbles)
     lengths = (limits.min_diameter, limits.min_web, limits.min_margin)
@@ -88,7 +89,8 @@ def floors_of(
     process = PROCESSES[limits.process]
     known = limits.thickness
     thickness = near_thickness(bubbles, region) if known is None else np.full(n, known)
-    deep = thickness / process.through if depth is None else np.full(n, depth / process.blind)
+    given = np.broadcast_to(np.nan if depth is None else depth, n).astype(np.float64)
+    deep = np.where(np.isnan(given), thickness / process.through, given / process.blind)
     return Floors(
         np.fmax(hole, process.hole.at(thickness, millimetre)),
         np.nan_to_num(deep),
@@ -120,13 +122,13 @@ def broken_rules(
     region: Region,
     floors: Floors,
     edge: Floats | None = None,
-    draft: float = 0.0,
+    draft: Floats | float = 0.0,
     least_draft: float = 0.0,
 ) -> tuple[Broken, ...]:
     """What the pattern as it stands breaks of its `floors`; nothing of what it keeps.
 
     edge: (n,) distances of the features' centres from the region's boundary, where they are known already
-    draft, least_draft: of the features' walls and what the process asks for, in degrees
+    draft, least_draft: of the features' walls, (n,) or one for all, and what the process asks for, in degrees
     """
     n, diameter = len(pattern), pattern.diameter
     if edge is None:
@@ -136,7 +138,7 @@ def broken_rules(
         ("slender", diameter, floors.slender),
         ("web", *_webs(pattern, region, floors.web)),
         ("margin", edge - diameter / 2, floors.margin),
-        ("draft", np.full(n, draft), np.full(n, least_draft)),
+        ("draft", np.broadcast_to(draft, n).astype(np.float64), np.full(n, least_draft)),
     )
     found = (_broken(pattern, *rule) for rule in rules)
     return tuple(broken for broken in found if broken is not None)

@@ -10,7 +10,7 @@ from .mesh import Floats, Ints
 from .packing.force import find_pairs
 from .pattern import Pattern
 from .region import Region
-from .surface import Charts, make_charts
+from .surface import Charts
 
 # Bubbles closer than this many stable distances are in neighbouring rows, or in the same.
 TOUCHING = 1.35
@@ -43,4 +43,4 @@ def find_links(charts: Charts, points: Floats, row: Ints, pitch: Floats) -> Link
 def links_of(pattern: Pattern, region: Region) -> Links:
     """Links between the features of a pattern on its region."""
     row = np.searchsorted(region.triangles, pattern.places.triangle)
-    return find_links(make_charts(region), pattern.position, row, pattern.pitch)
+    return find_links(region.charts, pattern.position, row, pattern.pitch)

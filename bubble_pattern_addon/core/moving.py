@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .blending import FaceSet
+from .feature_recipe import Feature
 from .mesh import Floats
 from .metric import Described
 from .painted import Image, mean_normal, upward
@@ -36,6 +37,18 @@ def moved_recipe(recipe: Recipe, matrix: Floats, region: Region) -> Recipe:
         region=replace(choice, near=None if choice.near is None else _moved_point(choice.near, matrix)),
         packing=replace(packing, pitch=moved(packing.pitch, matrix, region), orientation=orientation),
         shaping=replace(shaping, diameter=moved(shaping.diameter, matrix, region), seeds=seeds),
+        feature=moved_feature(recipe.feature, matrix, region),
+    )
+
+
+def moved_feature(feature: Feature, matrix: Floats, region: Region) -> Feature:
+    """The feature after the motion of everything."""
+    pull, heads, point = feature.pull, feature.turn_direction, feature.turn_point
+    return replace(
+        feature.with_fields(lambda field: moved(field, matrix, region)),
+        pull=None if pull is None else _turned(pull, matrix),
+        turn_direction=None if heads is None else _turned(heads, matrix),
+        turn_point=None if point is None else _moved_point(point, matrix),
     )
 
 

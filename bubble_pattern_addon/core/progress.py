@@ -9,12 +9,28 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 from typing import NamedTuple, TypeVar
 
+from .mesh import Floats
+
+
+class Snapshot(NamedTuple):
+    """Bubbles at a moment of their packing: position (n, 3) of their centres, normal (n, 3) of the surface
+    there, pitch (n,), the diameters of the bubbles.
+    """
+
+    position: Floats
+    normal: Floats
+    pitch: Floats
+
 
 class Progress(NamedTuple):
-    """Where the work stands: the stage's name (a present participle) and its share done, 0 to 1."""
+    """Where the work stands: the stage's name (a present participle) and its share done, 0 to 1.
+
+    snapshot: gives the bubbles as they are until the next step is taken; None where there is nothing to see
+    """
 
     stage: str
     fraction: float
+    snapshot: Callable[[], Snapshot] | None = None
 
 
 Result = TypeVar("Result")
@@ -25,10 +41,10 @@ def within(steps: Steps[Result], low: float, high: float) -> Steps[Result]:
     """Pass `steps` on as a part of longer work: their fractions 0 to 1 become `low` to `high`."""
     while True:
         try:
-            stage, fraction = next(steps)
+            progress = next(steps)
         except StopIteration as end:
             return end.value
-        yield Progress(stage, low + (high - low) * fraction)
+        yield progress._replace(fraction=low + (high - low) * progress.fraction)
 
 
 def drive(steps: Steps[Result], report: Callable[[Progress], None] | None = None) -> Result:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from .feature_recipe import Feature as Feature
 from .isometries import OFF
 from .metric import Constant, Described
 from .nominal import Sizes
@@ -20,7 +21,6 @@ from .units import Unit, millimetres_in
 INTEGRATORS = ("fire", "rk4")
 ORIENTATIONS = ("edge", "best")
 SOLVERS = ("direct", "iterate")
-KINDS = ("hole",)
 FORMATS = ("stl", "obj", "ply", "3mf", "glb")
 
 FILL = 0.6  # a feature's diameter relative to the pitch where the recipe gives only one of them
@@ -94,16 +94,6 @@ class Shaping:
     tolerance: float = 1e-6
     iterations: int = 10_000
     sizes: Sizes | None = None
-
-
-@dataclass(frozen=True)
-class Feature:
-    """What one feature is. depth None: through the near wall; facets by chord height, at least min_sides."""
-
-    kind: str = "hole"
-    depth: float | None = None
-    sides: int | None = None
-    tolerance: float | None = None
 
 
 @dataclass(frozen=True)

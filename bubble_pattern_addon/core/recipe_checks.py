@@ -6,6 +6,7 @@ import math
 
 from .blending import Fill
 from .errors import RecipeError
+from .feature_checks import check_feature
 from .field_tables import asks_for_pitch
 from .isometries import check_symmetry
 from .metric import Constant, Described
@@ -14,7 +15,6 @@ from .processes import PROCESSES
 from .recipe import (
     FORMATS,
     INTEGRATORS,
-    KINDS,
     ORIENTATIONS,
     SOLVERS,
     Limits,
@@ -51,7 +51,7 @@ def check_recipe(recipe: Recipe) -> None:
 
     The region's choice is left to check_choice: a caller that holds the faces already needs none.
     """
-    packing, feature, limits = recipe.packing, recipe.feature, recipe.limits
+    packing, limits = recipe.packing, recipe.limits
     _check_length(packing.pitch, "[packing] pitch")
     if asks_for_pitch(packing.pitch):
         raise RecipeError("[packing] pitch is given as a share of itself: fill goes with diameters")
@@ -67,13 +67,7 @@ def check_recipe(recipe: Recipe) -> None:
     check_symmetry(packing.symmetry, "[packing] symmetry")
     for coordinate in packing.symmetry_centre or ():
         check_finite(coordinate, "[packing] symmetry_centre")
-    check_one_of(feature.kind, KINDS, "[feature] kind")
-    if feature.depth is not None:
-        check_above(feature.depth, "[feature] depth")
-    if feature.sides is not None:
-        check_at_least(feature.sides, 3, "[feature] sides")
-    if feature.tolerance is not None:
-        check_above(feature.tolerance, "[feature] tolerance")
+    check_feature(recipe.feature, uniform_diameter(recipe))
     _check_limits(limits)
     _check_solve(recipe)
     _check_output(recipe.output)

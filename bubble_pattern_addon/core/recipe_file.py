@@ -10,6 +10,7 @@ from typing import Any
 
 from .blending import Fill
 from .errors import RecipeError
+from .feature_recipe import READERS as FEATURE_READERS
 from .field_tables import field_from_toml, field_to_toml
 from .metric import Constant, Described
 from .nominal import sizes_from_toml
@@ -164,7 +165,7 @@ READERS: dict[str, dict[str, Callable[[object, str], Any]]] = {
         "iterations": whole,
         "sizes": sizes_from_toml,
     },
-    "feature": {"kind": text, "depth": number, "sides": whole, "tolerance": number},
+    "feature": FEATURE_READERS,
     "limits": {
         **dict.fromkeys(("min_web", "min_margin", "min_diameter", "thickness"), number),
         "process": text,
@@ -190,6 +191,7 @@ def recipe_to_toml(recipe: Recipe) -> str:
             _line(entry.name, getattr(table, entry.name))
             for entry in fields(table)
             if getattr(table, entry.name) is not None
+            and (getattr(table, entry.name) or entry.name != "points")
         ]
         lines += [""]
     return "\n".join(lines)

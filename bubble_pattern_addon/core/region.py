@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -12,6 +13,9 @@ from scipy.sparse.csgraph import connected_components
 from .boxtree import BoxTree, build_tree
 from .errors import RegionError
 from .mesh import Bools, Floats, Ints, Mesh
+
+if TYPE_CHECKING:
+    from .surface import Charts
 
 # A triangle is flat when its height is below this share of its longest edge: walking over it would divide by
 # zero.
@@ -50,6 +54,13 @@ class Region:
     def corners(self) -> Floats:
         """Corner positions of the region's triangles, (R, 3, 3)."""
         return self.base.vertices[self.base.triangles[self.triangles]]
+
+    @cached_property
+    def charts(self) -> Charts:
+        """Frames of the triangles."""
+        from .surface import make_charts  # which knows regions
+
+        return make_charts(self)
 
     @cached_property
     def area_vectors(self) -> Floats:

@@ -18,6 +18,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .distance import boundary_distance
+from .feature_recipe import Feature
+from .feature_sizes import depths, feature_sizes
 from .floors import Broken, broken_rules, floors_of
 from .mesh import Floats, Ints, digest
 from .pattern import Pattern, all_bubbles
@@ -83,16 +85,16 @@ def results_of(pattern: Pattern, region: Region, recipe: Recipe, removed: float 
     """
     bubbles = all_bubbles(pattern)
     kept = np.searchsorted(bubbles.ids, pattern.ids)
-    depth = recipe.feature.depth
+    deep = depths(recipe.feature, bubbles)
     limits = replace(recipe.limits, check_only=False)
-    floors = floors_of(bubbles, region, limits, depth, recipe.millimetre).take(kept)
+    floors = floors_of(bubbles, region, limits, deep, recipe.millimetre).take(kept)
     if removed is None:
-        deep = near_thickness(bubbles, region)[kept] if depth is None else depth
-        removed = float((np.pi / 4 * pattern.diameter**2 * deep).sum())
+        removed = _estimated(pattern, region, recipe.feature, deep[kept])
     process = recipe.limits.process
     edge = boundary_distance(pattern.position, region.boundary_segments)
     least_draft = 0.0 if process is None else PROCESSES[process].draft
-    broken = broken_rules(pattern, region, floors, edge, least_draft=least_draft)
+    draft = np.degrees(np.arctan(feature_sizes(recipe.feature, pattern).draft))
+    broken = broken_rules(pattern, region, floors, edge, draft, least_draft)
     web, mean = webs(pattern)
     diameter = pattern.diameter
     some = len(pattern) > 0
@@ -110,6 +112,19 @@ def results_of(pattern: Pattern, region: Region, recipe: Recipe, removed: float 
         sizes=tuple((float(size), int(number)) for size, number in zip(sizes, count, strict=True)),
         broken=broken,
     )
+
+
+def _estimated(pattern: Pattern, region: Region, feature: Feature, deep: Floats) -> float:
+    """Volume that straight features of these depths (n,) take away; nan for other kinds, whose part alone
+    tells it.
+    """
+    if feature.kind != "hole":
+        return np.nan
+    through = np.isnan(deep)
+    if through.any():
+        deep = np.where(through, near_thickness(pattern, region), deep)
+    share = 1.0 if pattern.share is None else pattern.share
+    return float((np.pi / 4 * pattern.diameter**2 * share * deep).sum())
 
 
 def webs(pattern: Pattern) -> tuple[Web | None, float]:

@@ -8,7 +8,9 @@ import numpy as np
 
 from .averaging import averaged
 from .errors import FieldError, RecipeError
+from .feature_sizes import depths
 from .floors import Floors, floors_of
+from .heading import headed
 from .limits import limited_by
 from .links import Links, links_of
 from .mesh import Floats
@@ -40,9 +42,11 @@ def shaped(
     Raises RecipeError where a diameter is no positive length, a seed does not fit or no feature is left,
     FieldError where the surroundings lack something.
     """
-    wished, notes = diameters(recipe.shaping, bubbles, links, replace(surroundings, region=region))
+    surroundings = replace(surroundings, region=region)
+    wished, notes = diameters(recipe.shaping, bubbles, links, surroundings)
+    bubbles = headed(bubbles, links, recipe.feature, surroundings)
     mm = recipe.millimetre
-    floors = floors_of(bubbles, region, recipe.limits, recipe.feature.depth, mm)
+    floors = floors_of(bubbles, region, recipe.limits, depths(recipe.feature, bubbles), mm)
     pattern = limited_by(
         replace(bubbles, diameter=wished, notes=(*bubbles.packing_notes, *notes, *floors.notes)),
         region,

@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .errors import RecipeError, RegionError
+from .feature_sizes import depths
 from .floors import floors_of
 from .limits import limited_by
 from .mesh import Floats
@@ -100,7 +101,7 @@ def _by_diameter(region: Region, recipe: Recipe, surroundings: Surroundings) -> 
     bubbles = all_bubbles(packed)
     wished = bubbles.diameter if bubbles.wished is None else bubbles.wished
     mm = recipe.millimetre
-    floors = floors_of(bubbles, region, recipe.limits, recipe.feature.depth, mm)
+    floors = floors_of(bubbles, region, recipe.limits, depths(recipe.feature, bubbles), mm)
     sizes = nominal_sizes(recipe.shaping.sizes, mm)
 
     def open_at(factor: float) -> float:

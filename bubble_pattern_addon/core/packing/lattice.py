@@ -9,6 +9,7 @@ and what several bubbles propose for one place is averaged.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -17,7 +18,9 @@ from scipy.spatial import cKDTree
 
 from ..boundary import signature
 from ..mesh import Floats
+from ..progress import Progress, Snapshot, Steps, drive
 from ..surface import Charts, Complex, Spots, positions, product, to_frame, to_space, walk
+from .bubbles import joined
 from .crowding import close_pairs, uncrowded
 
 Lengths = Callable[[Spots], Floats]
@@ -41,6 +44,13 @@ def grow(
     after generation. Ends early when there are more than `most`. With a `field` of sixth powers of directions
     in the triangles' frames, (R,), the rows follow it wherever it is not 0.
     """
+    return drive(growing_steps(charts, pitch, seeds, directions, most, field))
+
+
+def growing_steps(
+    charts: Charts, pitch: Lengths, seeds: Spots, directions: Complex, most: int, field: Complex | None = None
+) -> Steps[tuple[Spots, Complex]]:
+    """Like grow, with a pause after every few generations, in which the bubbles can be looked at."""
     crowded = CROWDED if field is None else CROWDED_CLOSED
     crowd = _Crowd(charts, float(pitch(seeds).max()), crowded)
     spots, heading = seeds, directions
@@ -48,7 +58,13 @@ def grow(
     front, front_heading = seeds, directions
     generations = [(seeds, directions)]
     total = len(seeds.row)
+    full = charts.region.area / float(pitch(seeds).mean()) ** 2
     while len(front.row) and total <= most:
+        if len(generations) % RECENT == 0:
+            born = [spots for spots, _ in generations]
+            yield Progress(
+                "Growing the lattice", total / (total + full), partial(_grown, charts, pitch, born)
+            )
         proposals, turned = _proposals(charts, pitch, crowd, front, front_heading)
         front, front_heading = _agreed(charts, pitch, crowd, proposals, turned)
         if field is not None:
@@ -61,6 +77,12 @@ def grow(
     )
     heading = np.concatenate([heading for _, heading in generations])
     return spots, heading
+
+
+def _grown(charts: Charts, pitch: Lengths, generations: list[Spots]) -> Snapshot:
+    """The bubbles born so far."""
+    spots = joined(*generations)
+    return Snapshot(positions(charts, spots), charts.region.normals[spots.row], pitch(spots))
 
 
 def _following(heading: Complex, six: Complex) -> Complex:

@@ -14,18 +14,18 @@ from ..progress import Progress, Steps, within
 from ..quality import measure_points
 from ..recipe import Packing, rounded
 from ..region import Region
-from ..surface import Charts, Complex, Spots, make_charts, positions, to_frame, walk
+from ..surface import Charts, Complex, Spots, positions, to_frame, walk
 from ..symmetry import find_symmetry
 from .bubbles import Bubbles, Ground, can_move, joined
 from .crowding import close_pairs, uncrowded
 from .direction import smooth_directions
 from .force import STIFFNESS, stiff_law
-from .lattice import grow
+from .lattice import growing_steps
 from .narrows import in_the_narrows
 from .orbits import orbit_sizes, settled_leaders, symmetric_start, with_followers
 from .plane import fills_its_box, lay
 from .population import control, pressed_out
-from .relax import relax
+from .relax import relax_steps
 from .rim import (
     FirstRow,
     Lengths,
@@ -36,7 +36,7 @@ from .rim import (
     spots_on_track,
     straight_stretches,
 )
-from .rk4 import integrate
+from .rk4 import integration_steps
 from .symmetric_start import loop_starts, suiting, symmetric_seeds
 
 # A recipe that asks for more bubbles than this is taken for a slip of the pen.
@@ -60,7 +60,7 @@ STIFF_STEPS = 45
 def pack_steps(region: Region, packing: Packing) -> Steps[tuple[Ground, Bubbles]]:
     """Bubbles packed tightly in `region`. Raises RegionError where the pitch does not suit the region."""
     yield Progress("Reading the region", 0.0)
-    charts = make_charts(region)
+    charts = region.charts
     pitch = _pitch_over(region, packing.pitch)
     _check_count(region, pitch)
     uniform = packing.pitch.value if isinstance(packing.pitch, Constant) else None
@@ -108,7 +108,8 @@ def _settled(
 ) -> Steps[Bubbles]:
     """Bubbles in balance: those that are `fixed`, and a lattice from `seeds` with rows along `directions`."""
     yield Progress("Growing the lattice", 0.1)
-    bubbles = Bubbles(joined(fixed, _lattice(ground, seeds, directions)), len(fixed.row))
+    lattice = yield from within(_lattice(ground, seeds, directions), 0.1, 0.2)
+    bubbles = Bubbles(joined(fixed, lattice), len(fixed.row))
     if ground.symmetry is not None:
         bubbles = symmetric_start(ground, bubbles)
     if not len(bubbles):
@@ -119,11 +120,12 @@ def _settled(
     for number in range(ROUNDS):
         yield Progress("Packing the bubbles", 0.2 + 0.2 * number)
         local = local_pitch(ground, bubbles)
-        settle = relax if packing.integrator == "fire" else integrate
+        settle = relax_steps if packing.integrator == "fire" else integration_steps
         # At one pitch everywhere, whoever comes or goes after the first round stirs but a few neighbours.
         later = number > 0 and ground.uniform is not None
         steps = max(packing.iterations // (2 if later else 1), 1)
-        bubbles, _ = settle(ground, bubbles, _filling(ground, bubbles, local), steps, packing.tolerance)
+        settling = settle(ground, bubbles, _filling(ground, bubbles, local), steps, packing.tolerance)
+        bubbles, _ = yield from within(settling, 0.2 + 0.2 * number, 0.4 + 0.2 * number)
         bubbles, changed = control(ground, bubbles, local)
         if not changed:
             break
@@ -131,7 +133,17 @@ def _settled(
     while True:
         local = local_pitch(ground, bubbles)
         size, stiffness = _filling(ground, bubbles, local), 1.0 + STIFFNESS
-        bubbles, _ = relax(ground, bubbles, size, STIFF_STEPS, packing.tolerance, stiff_law, stiffness)
+        evening = relax_steps(
+            ground,
+            bubbles,
+            size,
+            STIFF_STEPS,
+            packing.tolerance,
+            stiff_law,
+            stiffness,
+            stage="Evening out the gaps",
+        )
+        bubbles, _ = yield from within(evening, 0.8, 0.95)
         kept = ~pressed_out(ground, bubbles, local_pitch(ground, bubbles))
         if kept.all():
             break
@@ -221,7 +233,7 @@ def _without_conflicts(ground: Ground, row: FirstRow) -> FirstRow:
     return row.take(uncrowded(pairs, rank))
 
 
-def _lattice(ground: Ground, seeds: Spots, directions: Complex) -> Spots:
+def _lattice(ground: Ground, seeds: Spots, directions: Complex) -> Steps[Spots]:
     """Bubbles of a lattice that fills what the first row leaves free."""
     charts = ground.charts
     seeds, directions, origin = symmetric_seeds(ground, seeds, directions)
@@ -233,7 +245,7 @@ def _lattice(ground: Ground, seeds: Spots, directions: Complex) -> Spots:
     field = smooth_directions(charts, closed[charts.region.sheet]) if closed.any() else None
     if field is not None:
         directions = np.where(closed, field[seeds.row] ** (1 / 6), directions)
-    spots, _ = grow(charts, ground.pitch, seeds, directions, MOST, field)
+    spots, _ = yield from growing_steps(charts, ground.pitch, seeds, directions, MOST, field)
     return _clear_of_rim(ground, spots)
 
 

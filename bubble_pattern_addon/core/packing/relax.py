@@ -9,10 +9,12 @@ and their neighbours, are worked on.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from ..mesh import Bools, Floats
+from ..progress import Progress, Steps, drive
 from .bubbles import Bubbles, Ground
 from .force import Law, force_law
 from .swarm import (
@@ -28,6 +30,7 @@ from .swarm import (
     list_anew,
     move,
     pull_on,
+    snapshot,
     swarm_of,
 )
 
@@ -36,6 +39,8 @@ LONGEST_STEP = 0.12
 # Steps between two looks at who feels a force; and looks among the active between two looks at all bubbles.
 BLOCK = 10
 LOOKS = 3
+# Half of the relaxations end within so many steps; for what is told of their progress.
+USUAL = 100
 # Where more than this share of the bubbles is active, telling them apart costs more than it spares.
 NEARLY_ALL = 0.7
 # Within a block a pair may come this much nearer than the list reaches, in pitches: it hardly pulls yet.
@@ -75,6 +80,21 @@ def relax(
     pitch: (n,) the bubbles' local pitch, held for the time of the relaxation; stiffness: of the law's
     contact, relative to the paper's. Bubbles for which `moving` (n,) is false stay where they are.
     """
+    return drive(relax_steps(ground, bubbles, pitch, iterations, tolerance, law, stiffness, moving))
+
+
+def relax_steps(
+    ground: Ground,
+    bubbles: Bubbles,
+    pitch: Floats,
+    iterations: int,
+    tolerance: float,
+    law: Law = force_law,
+    stiffness: float = 1.0,
+    moving: Bools | None = None,
+    stage: str = "Packing the bubbles",
+) -> Steps[tuple[Bubbles, Work]]:
+    """Like relax, with a pause after every few steps of all bubbles, in which they can be looked at."""
     swarm = swarm_of(ground, bubbles, pitch)
     quickest = QUICKEST / np.sqrt(stiffness)
     fire = Fire(np.zeros_like(swarm.points), quickest, 0.5 * quickest)
@@ -105,6 +125,8 @@ def relax(
         block = min(BLOCK, iterations - done)
         links = _block(swarm, fire, links, law, block)
         done += block
+        # nobody knows how many steps there will be: each brings the end nearer
+        yield Progress(stage, done / (done + USUAL), partial(snapshot, swarm))
         looked_at_all = done % (LOOKS * BLOCK) == 0
         looked_at_all |= len(links.active) == everyone.sum()
         if looked_at_all and len(links.active) < everyone.sum():

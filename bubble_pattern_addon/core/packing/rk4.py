@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from ..mesh import Floats
+from ..progress import Progress, Steps, drive
 from .bubbles import Bubbles, Ground
 from .force import Law, force_law
-from .relax import LONGEST_STEP
-from .swarm import SKIN, Work, bubbles_of, land, links_of, list_anew, move, pull_on, swarm_of, twin
+from .relax import BLOCK, LONGEST_STEP, USUAL
+from .swarm import SKIN, Work, bubbles_of, land, links_of, list_anew, move, pull_on, snapshot, swarm_of, twin
 
 # Time step in units of sqrt(m/k0): the lattice swings with at most sqrt(6), RK4 is stable up to 2.8.
 STEP = 0.5
@@ -24,11 +27,20 @@ def integrate(
     At most `iterations` steps. pitch: (n,) the bubbles' local pitch. Positions and forces are projected onto
     the surface at every stage.
     """
+    return drive(integration_steps(ground, bubbles, pitch, iterations, tolerance, law))
+
+
+def integration_steps(
+    ground: Ground, bubbles: Bubbles, pitch: Floats, iterations: int, tolerance: float, law: Law = force_law
+) -> Steps[tuple[Bubbles, Work]]:
+    """Like integrate, with a pause after every few steps, in which the bubbles can be looked at."""
     swarm = swarm_of(ground, bubbles, pitch)
     everyone = np.flatnonzero(swarm.movable)
     links = links_of(swarm, everyone)
     velocity = np.zeros((len(everyone), 3))
-    for _ in range(iterations):
+    for done in range(iterations):
+        if done % BLOCK == BLOCK - 1:
+            yield Progress("Packing the bubbles", done / (done + USUAL), partial(snapshot, swarm))
         if list_anew(swarm, everyone, SKIN / 2):
             links = links_of(swarm, everyone)
         slopes: list[tuple[Floats, Floats]] = []

@@ -13,6 +13,7 @@ from scipy.sparse import csc_array
 
 from ..isometries import image_of
 from ..mesh import Bools, Floats, Ints
+from ..progress import Snapshot
 from ..surface import Spots, positions, to_frame, walk
 from .bubbles import Bubbles, Ground, can_move, joined
 from .force import Law, Pairs, find_pairs, renewed_pairs
@@ -100,6 +101,12 @@ def swarm_of(ground: Ground, bubbles: Bubbles, pitch: Floats) -> Swarm:
         followers=followers,
         still=still,
     )
+
+
+def snapshot(swarm: Swarm) -> Snapshot:
+    """The bubbles as they are now."""
+    n = len(swarm.bubbles)
+    return Snapshot(swarm.points[:n].copy(), swarm.normal[:n].copy(), swarm.pitch[:n].copy())
 
 
 def follow(swarm: Swarm) -> None:

@@ -1,0 +1,98 @@
+"""Work under way in a window: a generator of progress steps, of which there is one at a time.
+
+A run outlives the operator that drives it, which Blender may free at any time; and it can be ended from
+outside: before undo, before another file is opened or this one is saved, when the add-on is switched off.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ..core.progress import Progress, Steps
+
+
+class Run:
+    """Some work under way. `latest` is its latest step; `result` what it returned, once it has `ended`."""
+
+    def __init__(self, steps: Steps[Any]) -> None:
+        self.steps = steps
+        self.latest = Progress("Working", 0.0)
+        self.result: Any = None
+        self.ended = False
+
+    @property
+    def open(self) -> bool:
+        """Whether there is more to do; neither ended nor stopped."""
+        return _under_way[0] is self
+
+    def advance(self, seconds: float) -> None:
+        """Take steps for `seconds`, at least one. What a step raises ends the run."""
+        until = time.perf_counter() + seconds
+        try:
+            while True:
+                self.latest = next(self.steps)
+                if time.perf_counter() >= until:
+                    return
+        except StopIteration as end:
+            self.result, self.ended = end.value, True
+            self._over()
+        except BaseException:
+            self._over()
+            raise
+
+    def stop(self) -> None:
+        """Give the work up between two steps; closing the generator undoes what it began."""
+        self._over()
+        self.steps.close()
+
+    def _over(self) -> None:
+        if self.open:
+            _under_way[0] = None
+
+
+_under_way: list[Run | None] = [None]
+
+
+def begin(steps: Steps[Any]) -> Run:
+    """Begin a run; another one under way is stopped."""
+    stop()
+    run = Run(steps)
+    _under_way[0] = run
+    return run
+
+
+def under_way() -> Run | None:
+    """The run under way."""
+    return _under_way[0]
+
+
+def stop() -> None:
+    """Stop the run under way, if there is one."""
+    if _under_way[0] is not None:
+        _under_way[0].stop()
+
+
+@persistent
+def stop_before(*_: Any) -> None:
+    """What is about to happen would pull the data away from under the work, or save it half-done."""
+    stop()
+
+
+HANDLERS = ("undo_pre", "redo_pre", "load_pre", "save_pre")
+
+
+def register() -> None:
+    """Have runs end before the data change."""
+    for name in HANDLERS:
+        getattr(bpy.app.handlers, name).append(stop_before)
+
+
+def unregister() -> None:
+    """End the run under way."""
+    stop()
+    for name in HANDLERS:
+        getattr(bpy.app.handlers, name).remove(stop_before)
