@@ -102,7 +102,7 @@ def size_figures(context: bpy.types.Context, settings: Any) -> list[Figure]:
 
 
 def nominal_rows(context: bpy.types.Context, settings: Any) -> list[tuple[str, str]]:
-    """How many features have which nominal diameter, the largest at the end; where the list would be long, only
+    """How many features have which nominal diameter, the largest at the end; where that is a long list, only
     how many diameters there are.
     """
     entries = [entry.split(",") for entry in settings.nominal.split(";") if entry]

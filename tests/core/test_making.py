@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from bubble_pattern_addon.core.density import mass
 from bubble_pattern_addon.core.distance import boundary_distance
 from bubble_pattern_addon.core.errors import RecipeError
+from bubble_pattern_addon.core.feature_sizes import narrowness
 from bubble_pattern_addon.core.fields import Linear
 from bubble_pattern_addon.core.floors import Floors, broken_rules, floors_of
 from bubble_pattern_addon.core.limits import limited_by
@@ -167,6 +168,40 @@ def test_a_deep_blind_feature_must_be_wide() -> None:
     blind = floors_of(pattern, SHEET, Limits(process="injection moulding", thickness=4.0), depth=4.0)
     assert through.diameter.tolist() == [1.0]
     assert blind.diameter.tolist() == [2.0]
+
+
+@pytest.mark.parametrize(
+    ("profile", "narrow"),
+    [
+        (Feature(), 1.0),
+        (Feature(profile="slot", aspect=0.5), 0.5),
+        (Feature(profile="rectangle", aspect=0.75), 0.75 / 1.25),
+        (Feature(profile="cross", aspect=0.3), 0.3 / np.hypot(1.0, 0.3)),
+        (Feature(profile="polygon", corners=6), np.cos(np.pi / 6)),
+        (Feature(profile="slot", aspect=Linear(from_=0.25, to=0.25, direction=(1.0, 0.0, 0.0))), 0.25),
+    ],
+)
+def test_the_narrow_side_of_a_profile_goes_by_the_rule_for_holes(profile: Feature, narrow: float) -> None:
+    limits = Limits(process="punched sheet", thickness=1.15)
+    found = packed(SHEET, feature=profile, limits=limits)
+    assert narrowness(profile, found) == pytest.approx(narrow, rel=1e-3)
+    assert found.diameter.min() * narrow >= 1.15 * (1 - 1e-3)
+    assert not results_of(found, SHEET, Recipe(feature=profile, limits=limits)).broken
+    free = packed(SHEET, feature=profile)
+    assert free.diameter.min() * narrow < 1.15
+    assert "hole" in {b.rule for b in results_of(free, SHEET, Recipe(feature=profile, limits=limits)).broken}
+
+
+def test_enough_draft_keeps_the_rule(plate: Region) -> None:
+    for draft, broken in ((0.5, {"draft"}), (1.0, set())):
+        recipe = Recipe(
+            packing=Packing(pitch=Constant(PITCH)),
+            shaping=Shaping(Constant(3.0)),
+            feature=Feature(draft=draft),
+            limits=Limits(process="injection moulding"),
+        )
+        pattern = drive(pattern_steps(plate, recipe))
+        assert {one.rule for one in results_of(pattern, plate, recipe).broken} == broken
 
 
 def test_every_rule_tells_who_breaks_it_and_by_how_much() -> None:
