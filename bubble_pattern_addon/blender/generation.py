@@ -93,6 +93,7 @@ def put(obj: bpy.types.Object, source: Source, recipe: Recipe, laid: Laid) -> No
     """Write what was laid to the pattern's object."""
     settings = obj.bubble_pattern
     write_pattern(obj, laid.pattern, settings.base, source.base)
+    settings.hand_made = False
     note(settings, source, recipe, laid)
     note_quality(settings, laid.quality)
     settings.seconds = laid.seconds
@@ -128,6 +129,8 @@ def react(settings: Any, context: bpy.types.Context, repack: bool) -> None:
     obj = settings.id_data
     if not answers(settings, context):
         return
+    if settings.hand_made and (repack or not is_only_shape(settings)):
+        return  # hand work is not thrown away without being asked
     try:
         if not repack and is_only_shape(settings):
             runs.stop()
@@ -166,6 +169,11 @@ def reshape(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     recipe = recipe_of(settings)
     source = read_source(settings.base, settings.region, context, recipe)
     if source.fingerprint != settings.fingerprint:
+        if settings.hand_made:
+            raise PatternError(
+                "The base has changed since the features were settled by hand: update the pattern, which "
+                "keeps only those that are pinned"
+            )
         drive(update_steps(obj, context))
         return
     pattern = reshaped(read_pattern(obj, source.base.mesh), source.region, recipe, source.surroundings)

@@ -171,6 +171,20 @@ class BUBBLE_PATTERN_OT_update(OnPattern, LayingOperator, bpy.types.Operator):
     bl_options = {'REGISTER', 'UNDO'}
     heeds_sidebar = True
 
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Ask before hand work is thrown away."""
+        settings = current_pattern(context).bubble_pattern
+        if not settings.hand_made:
+            return super().invoke(context, event)
+        return context.window_manager.invoke_confirm(  # type: ignore[no-any-return]
+            self,
+            event,
+            title="Lay the pattern anew?",
+            message="It was settled by hand. Only pinned features will stay where they are.",
+            confirm_text="Update",
+            icon='WARNING',
+        )
+
     def steps(self, context: bpy.types.Context) -> Steps[bpy.types.Object]:
         from . import generation
 

@@ -9,6 +9,7 @@ import bpy
 from ..core.density import mass
 from ..core.units import millimetres_in
 from .making_recipe import scene_unit
+from .recipe_operators import draw_files
 from .settings_recipe import is_outdated, length_text
 from .sidebar import SettingsPanel, columns, sentences, shown_settings
 
@@ -59,6 +60,7 @@ class BUBBLE_PATTERN_PT_result(SettingsPanel, bpy.types.Panel):
             go = row.operator("bubble_pattern.select_offending", text="", icon='VIEWZOOM')
             go.rule = 'SMALLEST_WEB'
         columns(layout).prop(settings, "density", text="Density (g/cm³)")
+        draw_files(layout)
         if settings.notes:
             sentences(layout, settings.notes, context.region.width, 'INFO')
 
