@@ -69,9 +69,7 @@ def control(
         gone[m:] |= _too_crowded(pairs, distance / pairs.stable, ratio[:n], owner, m, most)
     lonely, least = np.flatnonzero(ratio < LONELY), LAST_VOID if last else VOID
     lonely = lonely if filling else lonely[:0]
-    added, wide = _voids(ground, points, row, everywhere, lonely, pairs, least)
-    if wide:
-        added = joined(added, _fillings(ground, points, row, everywhere, lonely, added))
+    added = _voids(ground, points, row, everywhere, lonely, pairs, least)
     if not gone.any() and not len(added.row):
         return bubbles, 0
     if ground.symmetry is None:
@@ -79,6 +77,15 @@ def control(
     added = _leading(ground, added, points, row)
     grown = Bubbles(joined(bubbles.spots.take(~gone), added), m)
     return settled_leaders(ground, grown), int(gone.sum()) + len(added.row)
+
+
+def voids_among(ground: Ground, spots: Spots, pitch: Floats) -> Spots:
+    """Places for new bubbles in the voids among those at `spots`, of no symmetric pattern."""
+    points, row = positions(ground.charts, spots), spots.row
+    pairs = find_pairs(ground.charts, points, row, pitch, 0.0)
+    distance = np.linalg.norm(points[pairs.first] - points[pairs.second], axis=1)
+    ratio = overlap_ratio(pairs, distance, pitch)
+    return _voids(ground, points, row, pitch, np.flatnonzero(ratio < LONELY), pairs, VOID)
 
 
 def _leading(ground: Ground, added: Spots, points: Floats, row: Ints) -> Spots:
@@ -130,6 +137,16 @@ def _too_crowded(pairs: Pairs, relative: Floats, ratio: Floats, owner: Ints, m: 
 
 
 def _voids(
+    ground: Ground, points: Floats, row: Ints, pitch: Floats, lonely: Ints, pairs: Pairs, least: float
+) -> Spots:
+    """Places for new bubbles in the voids round which the `lonely` of the bubbles stand, where the circle
+    that fits in has a radius above `least`.
+    """
+    added, wide = _in_circles(ground, points, row, pitch, lonely, pairs, least)
+    return joined(added, _fillings(ground, points, row, pitch, lonely, added)) if wide else added
+
+
+def _in_circles(
     ground: Ground, points: Floats, row: Ints, pitch: Floats, lonely: Ints, pairs: Pairs, least: float
 ) -> tuple[Spots, bool]:
     """Places for new bubbles: centres of empty circles of a radius above `least` through three of the

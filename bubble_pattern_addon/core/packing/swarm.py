@@ -23,8 +23,8 @@ from .orbits import HALO, Followers, followers_of, held
 # and a bubble's are listed anew when it has moved by half of that.
 SKIN = 0.16
 # Pairs of bubbles of different sizes take long to find: they are listed out to this reserve as well, which
-# holds for several of the shorter lists.
-WIDE_SKIN = 0.5
+# holds for several of the shorter lists: until a bubble has moved so far, in pitches.
+WIDE_SKIN, WIDE_MOVED = 0.7, 0.4
 # Where fewer bubbles are at work, telling some apart from the others costs more than it spares.
 FEW = 3000
 # How far bubbles may move between two landings, in pitches: AFLOAT at first, then so far that by what they
@@ -124,7 +124,7 @@ def _pairs_now(swarm: Swarm) -> Pairs:
     if swarm.wide is not None:
         away = points - swarm.wide[1]
         shift = np.einsum("nc,nc->n", away, away) / pitch**2
-        if 2 * np.sqrt(shift.max(initial=0.0)) > WIDE_SKIN - SKIN:
+        if shift.max(initial=0.0) > WIDE_MOVED**2:
             swarm.wide = None
     if swarm.wide is None:
         swarm.wide = find_pairs(charts, points, row, pitch, WIDE_SKIN), points.copy()
