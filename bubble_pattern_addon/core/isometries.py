@@ -7,19 +7,22 @@ an n-fold rotation. Its words are those of `[packing] symmetry`.
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from .errors import RecipeError
 from .mesh import Floats, Ints
-from .toml_values import nearest, show
+from .toml_values import Point, nearest, show
 
 OFF, AUTO = "off", "auto"
 AXES = "xyz"
 # A letter stands for the plane square to that axis: "x" makes left and right alike.
 MIRRORS = ("x", "y", "z", "xy", "xz", "yz")
 MOST_FOLD = 60
+# Axes are square to one another to this.
+SQUARE = 1e-4
 # Images nearer to a point than this share of its reach are the point itself.
 SAME = 1e-6
 # A point drawn to where it is fixed arrives after few rounds.
@@ -32,7 +35,7 @@ class Isometries:
 
     word: how a recipe spells it; turns: (k, 3, 3) orthogonal; centre: (3,); generators: numbers of those that
     make all the others; planes: (m, 3) unit normals of the planes of a mirror symmetry, none for a rotation;
-    axis: number of a rotation's axis, -1 for mirrors
+    axis: number of a rotation's axis, -1 for mirrors; axes: (3, 3) unit vectors that the word calls x, y, z
     """
 
     word: str
@@ -41,6 +44,7 @@ class Isometries:
     generators: Ints
     planes: Floats
     axis: int
+    axes: Floats
 
     def __len__(self) -> int:
         return len(self.turns)
@@ -97,17 +101,27 @@ def words_of(word: str) -> list[str]:
     return [word]
 
 
-def isometries(word: str, centre: Floats) -> Isometries:
-    """The group that a checked `word` with its axis named stands for, about `centre` (3,)."""
-    fold = _fold(word)
+def check_axes(axes: Sequence[Point], where: str) -> None:
+    """RecipeError for axes that are not three vectors of length 1 square to one another, or none."""
+    given = np.array(axes, dtype=np.float64)
+    if len(axes) and (len(axes) != 3 or not np.abs(given @ given.T - np.eye(3)).max() < SQUARE):
+        raise RecipeError(f"{where} must be three vectors of length 1 that are square to one another")
+
+
+def isometries(word: str, centre: Floats, axes: Floats | None = None) -> Isometries:
+    """The group that a checked `word` with its axis named stands for, about `centre` (3,) with x, y and z
+    along the unit vectors `axes` (3, 3).
+    """
+    fold, axes = _fold(word), np.eye(3) if axes is None else axes
     if fold is not None:
         number, axis = fold[0], AXES.index(fold[1])
         turns = np.stack([_turn(axis, 2 * np.pi * step / number) for step in range(number)])
-        return Isometries(word, turns, centre, np.array([1]), np.empty((0, 3)), axis)
-    planes = np.eye(3)[[AXES.index(letter) for letter in word]]
+        turns = axes.T @ turns @ axes
+        return Isometries(word, turns, centre, np.array([1]), np.empty((0, 3)), axis, axes)
+    planes = axes[[AXES.index(letter) for letter in word]]
     mirrors = [np.eye(3) - 2 * np.outer(normal, normal) for normal in planes]
     turns = np.stack([np.eye(3), *mirrors, *([mirrors[0] @ mirrors[1]] if len(mirrors) == 2 else [])])
-    return Isometries(word, turns, centre, np.arange(1, len(mirrors) + 1), planes, -1)
+    return Isometries(word, turns, centre, np.arange(1, len(mirrors) + 1), planes, -1, axes)
 
 
 def _turn(axis: int, angle: float) -> Floats:
@@ -168,7 +182,7 @@ def depth(group: Isometries, points: Floats) -> Floats:
     offset = points - group.centre
     if len(group.planes):
         return (offset @ group.planes.T).min(axis=1)
-    across = offset[:, [(group.axis + 1) % 3, (group.axis + 2) % 3]]
+    across = offset @ group.axes[[(group.axis + 1) % 3, (group.axis + 2) % 3]].T
     distance, sector = np.linalg.norm(across, axis=1), 2 * np.pi / len(group)
     # Between the bounds of a sector that begins half a sector before the first axis.
     angle = np.arctan2(across[:, 1], across[:, 0])

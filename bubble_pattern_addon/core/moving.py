@@ -10,6 +10,7 @@ import numpy as np
 
 from .blending import FaceSet
 from .feature_recipe import Feature
+from .isometries import OFF
 from .keep_out import frame_along
 from .mesh import Floats
 from .metric import Described, Places
@@ -19,6 +20,8 @@ from .recipe import KeepOut, Recipe
 from .region import Region
 from .toml_values import Point
 
+# Vectors nearer to an axis than this are the axis: moved there and back, they are again.
+AXIS = 1e-6
 POINTS = {"start", "end", "centre", "near", "points", "lines"}
 DIRECTIONS = {"direction", "axis", "project", "up"}
 
@@ -47,12 +50,21 @@ def moved_recipe(recipe: Recipe, matrix: Floats, region: Region) -> Recipe:
             pitch=moved(packing.pitch, matrix, region),
             orientation=orientation,
             symmetry_centre=None if centre is None else _moved_point(centre, matrix),
+            symmetry_axes=_moved_axes(packing.symmetry_axes, matrix) if packing.symmetry != OFF else (),
             pins=tuple(_moved_point(pin, matrix) for pin in packing.pins),
         ),
         shaping=replace(shaping, diameter=moved(shaping.diameter, matrix, region), seeds=seeds),
         feature=moved_feature(recipe.feature, matrix, region),
         output=replace(recipe.output, projection=projection),
     )
+
+
+def _moved_axes(axes: tuple[Point, ...], matrix: Floats) -> tuple[Point, ...]:
+    """What a symmetry calls x, y and z after the motion; none where these are the axes themselves."""
+    turned = (np.array(axes) if axes else np.eye(3)) @ matrix[:3, :3].T
+    if np.abs(turned - np.eye(3)).max() < AXIS:
+        return ()
+    return tuple((x, y, z) for x, y, z in turned.tolist())
 
 
 def moved_pattern(pattern: Pattern, matrix: Floats, factor: float = 1.0) -> Pattern:

@@ -86,6 +86,7 @@ class Packing:
     symmetry: "off"; "auto", whichever the region has; "x", "xy" and so on, mirrored at planes square to these
     axes of the base; "rotate 3" or "rotate 3 z", turned into itself by thirds about an axis (see
     core.isometries); symmetry_centre: a point of the planes or the axis, None for the region's own middle
+    symmetry_axes: what the symmetry calls x, y and z where a base stands askew, none for the axes themselves;
     pins: where bubbles stay whatever becomes of the others
     """
 
@@ -98,6 +99,7 @@ class Packing:
     tolerance: float = 1e-3
     symmetry: str = OFF
     symmetry_centre: Point | None = None
+    symmetry_axes: tuple[Point, ...] = ()
     pins: tuple[Point, ...] = ()
 
 

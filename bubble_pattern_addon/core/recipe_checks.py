@@ -8,7 +8,7 @@ from .blending import Fill
 from .errors import RecipeError
 from .feature_checks import check_feature
 from .field_tables import asks_for_pitch
-from .isometries import check_symmetry
+from .isometries import check_axes, check_symmetry
 from .keep_out_checks import check_keep_outs
 from .metric import Constant, Described
 from .nominal import check_sizes
@@ -72,6 +72,7 @@ def check_recipe(recipe: Recipe) -> None:
     check_symmetry(packing.symmetry, "[packing] symmetry")
     for coordinate in packing.symmetry_centre or ():
         check_finite(coordinate, "[packing] symmetry_centre")
+    check_axes(packing.symmetry_axes, "[packing] symmetry_axes")
     for pin in packing.pins:
         for coordinate in pin:
             check_finite(coordinate, "[packing] pins")

@@ -180,6 +180,7 @@ READERS: dict[str, dict[str, Callable[[object, str], Any]]] = {
         "tolerance": number,
         "symmetry": text,
         "symmetry_centre": point,
+        "symmetry_axes": _points,
         "pins": _points,
     },
     "shaping": {

@@ -120,11 +120,17 @@ def _walked_to(charts: Charts, spots: Spots, points: Floats) -> Spots:
 
 
 def find_symmetry(
-    charts: Charts, boundary: Boundary | None, pitch: Lengths, word: str, centre: Sequence[float] | None
+    charts: Charts,
+    boundary: Boundary | None,
+    pitch: Lengths,
+    word: str,
+    centre: Sequence[float] | None,
+    axes: Sequence[Sequence[float]] = (),
 ) -> Finding:
     """The symmetry that a recipe's `word` asks for, where region and metric have it.
 
-    centre: a point of all planes or of the axis; None for the middle of the region's area
+    centre: a point of all planes or of the axis; None for the middle of the region's area; axes: (3, 3) what
+    the word calls x, y and z, none for the axes themselves
     """
     if word == OFF:
         return Finding()
@@ -135,7 +141,7 @@ def find_symmetry(
     middle = _middle(charts, TOLERANCE * local) if centre is None else np.array(centre, dtype=np.float64)
     best: tuple[float, Isometries] | None = None
     for spelled in words_of(word):
-        group = isometries(spelled, middle)
+        group = isometries(spelled, middle, np.array(axes) if len(axes) else None)
         off = max(_off(finder, boundary, group, int(number), FEW) for number in group.generators)
         if off < TOLERANCE * local:
             off = max(_off(finder, boundary, group, int(number)) for number in group.generators)

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from bubble_pattern_addon.core.blending import Blend, Fill
+from bubble_pattern_addon.core.errors import RecipeError
 from bubble_pattern_addon.core.fields import Distance, Edge, Linear, Radial
 from bubble_pattern_addon.core.mesh import Floats, Mesh
 from bubble_pattern_addon.core.metric import Constant, Described, Places
 from bubble_pattern_addon.core.moving import moved, moved_recipe
 from bubble_pattern_addon.core.painted import Image
+from bubble_pattern_addon.core.pipeline import pattern_steps
+from bubble_pattern_addon.core.progress import drive
 from bubble_pattern_addon.core.recipe import Packing, Recipe, RegionChoice, Seed, Shaping
+from bubble_pattern_addon.core.recipe_checks import check_recipe
+from bubble_pattern_addon.core.recipe_file import recipe_from_dict, recipe_to_toml
 from bubble_pattern_addon.core.region import Region, make_region
 from bubble_pattern_addon.core.surroundings import Surroundings
 from scripts.shapes import SHAPES
@@ -53,6 +60,28 @@ FIELDS: list[Described] = [
     Image(**ENDS, image="grey", project=(1.0, 0.2, 1.0), up=(0.0, 1.0, 0.0)),
     Fill(Blend(first=Constant(0.3), second=Linear(**ENDS, direction=(0.0, 1.0, 0.0)), mask=Radial(**ENDS))),
 ]
+
+
+@pytest.mark.parametrize("word", ["x", "xy", "rotate 2 z"])
+def test_a_symmetry_turns_with_the_base_and_back(word: str) -> None:
+    """The pattern on a base that stands askew is that on the upright one, moved."""
+    packing = Packing(pitch=Constant(25.0), symmetry=word)
+    recipe = Recipe(region=RegionChoice(all=True), packing=packing, shaping=Shaping(Constant(9.0)))
+    here, there = regions("panel-coarse")
+    askew = moved_recipe(recipe, MATRIX, here)
+    assert recipe_from_dict(tomllib.loads(recipe_to_toml(askew))) == askew
+    assert moved_recipe(askew, np.linalg.inv(MATRIX), there).packing == recipe.packing
+    one, other = (drive(pattern_steps(*given)) for given in ((here, recipe), (there, askew)))
+    assert one.symmetry == other.symmetry == word
+    moved_there = one.position @ MATRIX[:3, :3].T + MATRIX[:3, 3]
+    assert cKDTree(moved_there).query(other.position)[0].max() < 0.02 * 25.0
+    assert drive(pattern_steps(there, recipe)).symmetry is None
+
+
+def test_axes_that_are_none_are_refused() -> None:
+    for axes in (((1.0, 0.0, 0.0),), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 1.0, 1.0))):
+        with pytest.raises(RecipeError, match="symmetry_axes"):
+            check_recipe(Recipe(RegionChoice(all=True), Packing(symmetry_axes=axes)))
 
 
 @pytest.mark.parametrize("field", FIELDS)

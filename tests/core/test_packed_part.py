@@ -6,18 +6,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bubble_pattern_addon.core.fields import Linear, Radial
 from bubble_pattern_addon.core.files import load_base
 from bubble_pattern_addon.core.mesh import Mesh
-from bubble_pattern_addon.core.metric import Constant
+from bubble_pattern_addon.core.metric import Constant, Described
 from bubble_pattern_addon.core.pattern import Pattern
 from bubble_pattern_addon.core.pipeline import pattern_steps
 from bubble_pattern_addon.core.progress import drive
+from bubble_pattern_addon.core.quality import min_margin, min_web
 from bubble_pattern_addon.core.recipe import Feature, Packing, Recipe, Shaping
 from bubble_pattern_addon.core.region import make_region
 from bubble_pattern_addon.core.solid import Part, part_steps
+from bubble_pattern_addon.core.surroundings import Surroundings
 from scripts.shapes import Shape, curved_slab, plate, thin_wall, trapezoid_slab
 from tests.core.bases import polygon_area
 
+HOLE = Feature(kind="hole", sides=24)
 HOUSING = Path(__file__).resolve().parents[3] / "shared" / "data" / "LCD-cover-ORIGINAL-MK3.stl"
 
 
@@ -48,6 +52,36 @@ def assert_laws(part: Part) -> None:
     assert check.base_euler - check.euler == 2 * check.through
     assert check.bodies == check.base_bodies
     assert check.through + len(part.failures) == len(part.pierced)
+
+
+GRADED_PITCH = Linear(from_=4.0, to=9.0, direction=(1.0, 0.0, 0.0))
+GRADED_SIZE = Radial(from_=1.6, to=3.2, centre=(0.0, 0.0, 0.0), radius=30.0)
+
+
+@pytest.mark.parametrize("pitch", [Constant(6.0), GRADED_PITCH], ids=["uniform packing", "graded packing"])
+@pytest.mark.parametrize("diameter", [Constant(2.4), GRADED_SIZE], ids=["uniform sizes", "graded sizes"])
+def test_table_1_of_the_paper_from_the_recipe_to_a_watertight_part(
+    pitch: Described, diameter: Described
+) -> None:
+    """Regular and graded packing and sizes go together as they please (paper, Table 1)."""
+    shape = plate(60.0, 40.0, 3.0, 6.0)
+    recipe = replace(Recipe(), packing=Packing(pitch=pitch), shaping=Shaping(diameter=diameter))
+    region = make_region(shape.mesh, shape.selected)
+    pattern = drive(pattern_steps(region, recipe))
+    # both are what was asked for, wherever the features are
+    there = Surroundings(region=region)
+    assert pattern.pitch == pytest.approx(pitch.bind(there)(pattern.places))
+    assert pattern.diameter == pytest.approx(diameter.bind(there)(pattern.places))
+    assert (np.ptp(pattern.pitch) > 3.0) == (pitch is GRADED_PITCH)
+    assert (np.ptp(pattern.diameter) > 0.9) == (diameter is GRADED_SIZE)
+    assert min_web(pattern) > 0.5
+    assert min_margin(pattern, region) > 0.0
+    part = drive(part_steps(shape.mesh, pattern, HOLE))
+    assert_laws(part)
+    assert part.check.through == len(pattern) > 50
+    assert not part.check.problems
+    drilled = sum(polygon_area(float(size), HOLE.sides) for size in pattern.diameter) * 3.0
+    assert part.check.removed_volume == pytest.approx(drilled, rel=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ from .bases import slab
 # Keys that hold numbers, points or fields but no length.
 PURE = {
     "region": {"max_angle"},
-    "packing": {"orientation", "tolerance"},
+    "packing": {"orientation", "tolerance", "symmetry_axes"},
     "shaping": {"tolerance"},
     "feature": {
         *("draft", "rim_angle", "aspect", "rounding", "points", "axis", "pull", "turn_direction", "angle"),

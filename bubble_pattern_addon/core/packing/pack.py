@@ -68,9 +68,8 @@ def pack_steps(region: Region, packing: Packing) -> Steps[tuple[Ground, Bubbles]
     if packing.pins:
         ground = _pinned(ground, packing)
     else:
-        finding = find_symmetry(
-            charts, ground.boundary, ground.pitch, packing.symmetry, packing.symmetry_centre
-        )
+        asked = packing.symmetry, packing.symmetry_centre, packing.symmetry_axes
+        finding = find_symmetry(charts, ground.boundary, ground.pitch, *asked)
         ground = replace(ground, symmetry=finding.symmetry, notes=finding.notes)
     row = first_row(ground.track, loop_starts(ground))
     along, between = in_the_narrows(ground, _without_conflicts(ground, row))
