@@ -17,7 +17,7 @@ import numpy as np
 
 from ..core.errors import BaseError, OutputError
 from ..core.field_tables import NO_NAMES, Wanted
-from ..core.files import LoadedBase
+from ..core.files import LoadedBase, load_base
 from ..core.mesh import Bools, Floats, Mesh
 from ..core.metric import Places
 from ..core.moving import moved_recipe
@@ -147,7 +147,7 @@ def write_blend(path: Path, run: Run) -> None:
             mark(base_obj, region, base, run.selected)
         pattern_obj = new_pattern_object(base_obj)
         to_frame = np.linalg.inv(world_frame(base_obj))
-        fill_settings(pattern_obj, base_obj, region, moved_recipe(with_images_in(run), to_frame, run.region))
+        fill_settings(pattern_obj, base_obj, region, moved_recipe(with_files_in(run), to_frame, run.region))
         recipe = recipe_of(pattern_obj.bubble_pattern)
         source = read_source(base_obj, region, bpy.context, recipe)
         own = moved(run.pattern, to_frame)
@@ -162,8 +162,10 @@ def write_blend(path: Path, run: Run) -> None:
             raise OutputError(f"{path.name} can't be written: {str(error).removeprefix('Error: ')}") from None
 
 
-def with_images_in(run: Run) -> Recipe:
-    """The recipe with the image files that it names taken into the open file, under names that fit there."""
+def with_files_in(run: Run) -> Recipe:
+    """The recipe with the files that it names, images and a mesh, taken into the open file, under names that
+    fit there.
+    """
     names: dict[str, str] = {}
     for name in sorted(recipe_names(run.recipe).images):
         if (run.origin / name).is_file():
@@ -172,7 +174,23 @@ def with_images_in(run: Run) -> Recipe:
             image.pack()
             image.use_fake_user = True  # a field that is kept as text does not hold it
             names[name] = image.name
-    return with_recipe_images(run.recipe, names)
+    recipe = with_recipe_images(run.recipe, names)
+    mesh = recipe.feature.mesh
+    if mesh is not None and (run.origin / mesh).is_file():
+        name = stand_aside(Path(mesh).stem, load_base(run.origin / mesh).mesh)
+        recipe = replace(recipe, feature=replace(recipe.feature, mesh=name))
+    return recipe
+
+
+def stand_aside(name: str, body: Mesh) -> str:
+    """Put a mesh into the open file as a hidden object, and say what it is called there."""
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(body.vertices.tolist(), [], body.triangles.tolist())
+    obj = bpy.data.objects.new(name, mesh)
+    bpy.context.collection.objects.link(obj)
+    obj.hide_render = True
+    obj.hide_set(True)
+    return obj.name
 
 
 def write_picture(path: Path, run: Run, size: tuple[int, int] = SIZE, up: Floats | None = None) -> None:
