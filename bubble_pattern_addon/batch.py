@@ -20,22 +20,31 @@ from typing import Any, NoReturn, Protocol, cast
 
 import numpy as np
 
+from .core.drawing import Drawing, make_drawing
+from .core.drawing_files import drawing_report, write_drawing
+from .core.drawn_shapes import drawn_shapes
 from .core.errors import BaseError, FieldError, OutputError, PatternError
 from .core.export import make_report, write_features, write_report
-from .core.field_tables import Wanted, wanted, with_images
-from .core.files import LoadedBase, load_base, output_folder, write_mesh
-from .core.mesh import Bools, Floats
+from .core.feature_recipe import nouns
+from .core.field_tables import Wanted
+from .core.files import LoadedBase, load_base, load_solids, output_folder, write_mesh
+from .core.keep_out import region_with_keep_outs
+from .core.mesh import Bools, Floats, Mesh
 from .core.pattern import Pattern
 from .core.pipeline import pattern_steps
-from .core.progress import Progress, Steps, drive, within
-from .core.recipe import Recipe, default_recipe
+from .core.progress import Progress, Result, Steps, drive, within
+from .core.recipe import KeepOut, Recipe, RegionChoice, default_recipe
 from .core.recipe_file import load_recipe, recipe_to_toml
-from .core.region import Region, make_region
+from .core.recipe_names import recipe_names, with_recipe_images
+from .core.recipe_units import load_fitted_recipe
+from .core.region import Region
 from .core.selection import select, sub_regions
 from .core.sides import check_one_side
 from .core.solid import Part, part_steps
+from .core.solving import solving_steps
 from .core.soundness import sound_base
 from .core.surroundings import Surroundings
+from .core.units import millimetres_in
 from .terminal import line_on, silenced
 
 EXAMPLE = """\
@@ -57,7 +66,8 @@ example of a run:
 class Run:
     """Everything a batch run knows when the part is made.
 
-    selected: (T,) the target region's triangles; origin: the folder from which the recipe names its images
+    selected: (T,) the target region's triangles; origin: the folder from which the recipe names its images;
+    drawing: of the pattern, where the recipe asks for one; millimetres: in a unit of the base
     """
 
     recipe: Recipe
@@ -68,19 +78,25 @@ class Run:
     part: Part
     report: Mapping[str, Any]
     origin: Path = Path()
+    drawing: Drawing | None = None
+    millimetres: float = 1.0
 
 
 class BlenderSide(Protocol):
     """What `blender.batch_base` does for a batch run."""
 
-    def read_base(self, path: Path | None, names: Wanted) -> LoadedBase:
-        """The base in a .blend file, in world coordinates, with what `names` asks for; None: in the file that
-        is open.
+    def read_base(self, path: Path | None, names: Wanted, keep_outs: Sequence[KeepOut]) -> LoadedBase:
+        """The base in a .blend file, in world coordinates, with what `names` and `keep_outs` ask for; None:
+        in the file that is open.
         """
         ...
 
     def read_image(self, name: str, folder: Path) -> Floats:
         """The pixels of an image file, or of the open file's image of that name."""
+        ...
+
+    def read_stamp(self, name: str) -> Mesh:
+        """The object of the open file with that name, in its own coordinates."""
         ...
 
     def write_blend(self, path: Path, run: Run) -> None:
@@ -102,23 +118,48 @@ def run_steps(base: LoadedBase, recipe_file: Path) -> Steps[Run]:
     """
     clock = Clock()
     yield Progress("Reading the region", 0.0)
-    choice = load_recipe(recipe_file).region
+    choice = recipe_for(base, recipe_file).region
     selected = select(base.mesh, choice, base.attributes, base.materials)
     parts = sub_regions(choice, base.attributes, base.materials)
-    region = make_region(base.mesh, selected, parts, choice.gap)
-    recipe = load_recipe(recipe_file, default_recipe(region.area, region.perimeter))
+    masks = {**base.materials, **base.attributes}
+    files = [keep_out.file for keep_out in choice.keep_out if keep_out.file is not None]
+    solids = {**base.solids, **load_solids(files, recipe_file.parent)}
+    region = region_with_keep_outs(base.mesh, selected, parts, choice.gap, choice.keep_out, masks, solids)
+    recipe = recipe_for(base, recipe_file, region)
+    millimetres = base.millimetres or millimetres_in(recipe.output.unit or "mm")
     sound_base(base.mesh)  # step 3 looks again; but nobody shall wait for a packing to be told of a hole
-    if recipe.feature.depth is None:
+    if recipe.feature.through:
         check_one_side(base.mesh, selected)
     surroundings = surroundings_of(base, read_images(recipe, recipe_file.parent))
     clock.stop("region")
-    pattern = yield from clock.timed(within(pattern_steps(region, recipe, surroundings), 0.0, 0.5))
-    part = yield from within(part_steps(base.mesh, pattern, recipe.feature), 0.5, 1.0)
+    stamp, solved = read_stamp(recipe, recipe_file.parent), None
+    if recipe.solve:
+        solved = yield from clock.timed(within(solving_steps(region, recipe, surroundings), 0.0, 0.5))
+        recipe, pattern = solved.recipe, solved.pattern
+    else:
+        pattern = yield from clock.timed(within(pattern_steps(region, recipe, surroundings), 0.0, 0.5))
+    drawing = draw(region, pattern, recipe, millimetres) if recipe.output.drawings else None
+    part = yield from within(part_steps(base.mesh, pattern, recipe.feature, stamp), 0.5, 1.0)
     clock.stop("add")
-    report = make_report(region, pattern, part, clock.seconds)
+    report = make_report(region, pattern, part, clock.seconds, recipe, solved) | drawing_report(drawing)
     if part.check.problems:
         raise BaseError(f"The part is not good: {' '.join(part.check.problems)}")
-    return Run(recipe, base, selected, region, pattern, part, report, recipe_file.parent)
+    origin = recipe_file.parent
+    return Run(recipe, base, selected, region, pattern, part, report, origin, drawing, millimetres)
+
+
+def recipe_for(base: LoadedBase, recipe_file: Path, region: Region | None = None) -> Recipe:
+    """The recipe in a file, in the unit of the base where both say theirs, with what it leaves out fitted to
+    the region.
+    """
+    fitting = Recipe() if region is None else default_recipe(region.area, region.perimeter)
+    return load_fitted_recipe(recipe_file, fitting, base.millimetres)
+
+
+def draw(region: Region, pattern: Pattern, recipe: Recipe, millimetres: float) -> Drawing:
+    """The drawing that the recipe asks for. RegionError where the region can't be drawn so."""
+    shapes = drawn_shapes(pattern, recipe.feature)
+    return make_drawing(region, pattern, recipe.output.projection, recipe.output.align, millimetres, shapes)
 
 
 def read_images(recipe: Recipe, folder: Path) -> dict[str, Floats]:
@@ -126,7 +167,7 @@ def read_images(recipe: Recipe, folder: Path) -> dict[str, Floats]:
 
     Raises FieldError where one cannot be read, or this Python has no Blender in it.
     """
-    names = sorted(wanted(recipe.packing.pitch, recipe.shaping.diameter).images)
+    names = sorted(recipe_names(recipe).images)
     if not names:
         return {}
     try:
@@ -137,6 +178,24 @@ def read_images(recipe: Recipe, folder: Path) -> dict[str, Floats]:
             "`blender -b -P scripts/pattern_batch.py -- ...`"
         ) from None
     return {name: side.read_image(name, folder) for name in names}
+
+
+def read_stamp(recipe: Recipe, folder: Path) -> Mesh | None:
+    """The mesh that the recipe's features are, None where they are none: a file seen from `folder`, or else
+    an object of the .blend that is open.
+
+    Raises BaseError where there is neither.
+    """
+    name = recipe.feature.mesh
+    if name is None:
+        return None
+    if (folder / name).is_file():
+        return load_base(folder / name).mesh
+    try:
+        side = blender_side()
+    except OutputError:
+        raise BaseError(f"[feature] mesh: {folder / name} does not exist: check the path") from None
+    return side.read_stamp(name)
 
 
 def surroundings_of(base: LoadedBase, images: Mapping[str, Floats]) -> Surroundings:
@@ -164,7 +223,7 @@ class Clock:
         self.seconds[stage] = self.seconds.get(stage, 0.0) + now - self.last
         self.last = now
 
-    def timed(self, steps: Steps[Pattern]) -> Steps[Pattern]:
+    def timed(self, steps: Steps[Result]) -> Steps[Result]:
         """Pass steps 1 and 2 on, and book what follows a "Shaping" on the stage shape, all else on pack."""
         stage = "pack"
         while True:
@@ -183,10 +242,13 @@ def write_run(run: Run, folder: Path, blender: Callable[[], BlenderSide]) -> Non
     """All files of a run, into a folder that is there (see files.output_folder)."""
     write_mesh(folder / "part.stl", run.part.mesh)
     for name in run.recipe.output.formats:
-        write_mesh(folder / f"part.{name}", run.part.mesh)
+        write_mesh(folder / f"part.{name}", run.part.mesh, run.millimetres)
+    for name in run.recipe.output.drawings:
+        assert run.drawing is not None
+        write_drawing(folder / f"pattern.{name}", run.drawing)
     write_features(folder / "features.csv", run.pattern)
     write_report(folder / "report.json", run.report)
-    recipe = with_copied_images(run, folder)
+    recipe = with_copied_files(run, folder)
     (folder / "recipe.toml").write_text(recipe_to_toml(recipe), encoding="utf-8")
     if run.recipe.output.blend:
         blender().write_blend(folder / "pattern.blend", run)
@@ -194,19 +256,33 @@ def write_run(run: Run, folder: Path, blender: Callable[[], BlenderSide]) -> Non
         blender().write_picture(folder / "part.png", run)
 
 
-def with_copied_images(run: Run, folder: Path) -> Recipe:
-    """The recipe with the image files that it names copied beside it: there it makes the same part."""
-    packing, shaping = run.recipe.packing, run.recipe.shaping
+def with_copied_files(run: Run, folder: Path) -> Recipe:
+    """The recipe with the files that it names, images and meshes, copied beside it: there it makes the same
+    part.
+    """
     names: dict[str, str] = {}
-    for number, name in enumerate(sorted(wanted(packing.pitch, shaping.diameter).images), 1):
+    for number, name in enumerate(sorted(recipe_names(run.recipe).images), 1):
         if (run.origin / name).is_file():  # else it is in the .blend
             names[name] = f"image_{number}{Path(name).suffix}"
             shutil.copyfile(run.origin / name, folder / names[name])
-    return replace(
-        run.recipe,
-        packing=replace(packing, pitch=with_images(packing.pitch, names)),
-        shaping=replace(shaping, diameter=with_images(shaping.diameter, names)),
-    )
+    recipe = with_recipe_images(run.recipe, names)
+    mesh = recipe.feature.mesh
+    if mesh is not None and (run.origin / mesh).is_file():
+        shutil.copyfile(run.origin / mesh, folder / f"feature{Path(mesh).suffix}")
+        recipe = replace(recipe, feature=replace(recipe.feature, mesh=f"feature{Path(mesh).suffix}"))
+    return replace(recipe, region=with_copied_keep_outs(recipe.region, run.origin, folder))
+
+
+def with_copied_keep_outs(choice: RegionChoice, origin: Path, folder: Path) -> RegionChoice:
+    """The choice with the mesh files of its keep-outs, as seen from `origin`, copied into the folder."""
+    entries = []
+    for number, entry in enumerate(choice.keep_out, 1):
+        copied = entry.file
+        if copied is not None:
+            copied = f"keep_out_{number}{Path(copied).suffix}"
+            shutil.copyfile(origin / str(entry.file), folder / copied)
+        entries.append(replace(entry, file=copied))
+    return replace(choice, keep_out=tuple(entries))
 
 
 def blender_side() -> BlenderSide:
@@ -251,16 +327,18 @@ def parse(arguments: Sequence[str], prog: str) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def read_base(path: Path | None, in_blender: bool, names: Wanted) -> LoadedBase:
-    """The base that the command line names, with what `names` asks for; None is the file open in Blender."""
+def read_base(path: Path | None, in_blender: bool, names: Wanted, keep_outs: Sequence[KeepOut]) -> LoadedBase:
+    """The base that the command line names, with what `names` and `keep_outs` ask for; None is the file open
+    in Blender.
+    """
     if path is None:
         if not in_blender:
             raise BaseError("No base is given: add --base MODEL")
-        return blender_side().read_base(None, names)
+        return blender_side().read_base(None, names, keep_outs)
     if path.suffix.lower() == ".blend":
         if not path.exists():
             raise BaseError(f"Base {path} does not exist: check the path")
-        return blender_side().read_base(path, names)
+        return blender_side().read_base(path, names, keep_outs)
     return load_base(path)
 
 
@@ -283,8 +361,8 @@ def main(
     try:
         recipe = load_recipe(options.recipe)  # nonsense is told before a long read
         with hushed():
-            names = wanted(recipe.packing.pitch, recipe.shaping.diameter)
-            base = read_base(options.base, in_blender, names)
+            names = recipe_names(recipe)
+            base = read_base(options.base, in_blender, names, recipe.region.keep_out)
         with output_folder(options.out) as folder:
             run = drive(run_steps(base, options.recipe), show)
             with hushed():
@@ -314,7 +392,13 @@ def summary(run: Run, out: Path) -> str:
     webs = "" if figures["min_web"] is None else f", smallest web {figures['min_web']:.3g}"
     limits = figures["limits"]
     cut = "".join(f", {limits[key]:,} {key}" for key in ("shrunk", "dropped") if limits[key])
+    share = "open" if figures["kind"] == "hole" else "covered"
+    rules = "".join(
+        f", {len(rule['ids']):,} break{'s' if len(rule['ids']) == 1 else ''} the {rule['rule']} rule"
+        for rule in figures["broken"]
+    )
     return (
-        f"{figures['features']:,} holes, {100 * figures['open_area']:.1f} % open{webs}{cut}; "
+        f"{nouns(figures['kind'], figures['features'])}, {100 * figures['open_area']:.1f} % {share}"
+        f"{webs}{cut}{rules}; "
         f"watertight part in {out / 'part.stl'}"
     )

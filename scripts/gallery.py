@@ -128,18 +128,17 @@ def make(name: str, folder: Path, size: tuple[int, int], show: Callable[[Progres
     """
     from bubble_pattern_addon import batch
     from bubble_pattern_addon.blender import batch_base
-    from bubble_pattern_addon.core.field_tables import wanted
     from bubble_pattern_addon.core.files import output_folder
     from bubble_pattern_addon.core.progress import Progress, drive, within
     from bubble_pattern_addon.core.recipe_file import load_recipe
+    from bubble_pattern_addon.core.recipe_names import recipe_names
     from scripts.progress_bar import follow_rendering
 
     show(Progress("Modelling", 0.0))
     with output_folder(folder) as files:
         write_base_of(name, files / "base.blend")
         recipe = load_recipe(RECIPES / f"{name}.toml")
-        names = wanted(recipe.packing.pitch, recipe.shaping.diameter)
-        base = batch_base.read_base(files / "base.blend", names)
+        base = batch_base.read_base(files / "base.blend", recipe_names(recipe))
         steps = within(batch.run_steps(base, RECIPES / f"{name}.toml"), 0.05, 0.4)
         run = drive(steps, show)
         output = replace(run.recipe.output, blend=True, picture=True)

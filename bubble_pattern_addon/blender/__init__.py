@@ -2,9 +2,45 @@
 
 from __future__ import annotations
 
-from . import command, fixed_sizes, live, operators, panels, properties, runs, versioning, watching
+from . import (
+    command,
+    export_operator,
+    fixed_sizes,
+    hand_work,
+    keep_outs,
+    live,
+    offenders,
+    operators,
+    overlay,
+    panels,
+    presets,
+    properties,
+    recipe_operators,
+    runs,
+    solving,
+    versioning,
+    watching,
+)
 
-MODULES = (properties, watching, runs, live, operators, fixed_sizes, panels, versioning, command)
+MODULES = (
+    properties,
+    watching,
+    runs,
+    live,
+    operators,
+    fixed_sizes,
+    hand_work,
+    keep_outs,
+    solving,
+    offenders,
+    recipe_operators,
+    export_operator,
+    presets,
+    panels,
+    versioning,
+    overlay,
+    command,
+)
 
 
 def register() -> None:

@@ -9,6 +9,7 @@ from ..core.pattern import joined
 from ..core.progress import Progress, Steps
 from ..core.sides import check_one_side
 from ..core.solid import Part, Plan, cutting_seconds, part_steps
+from .feature_objects import stamp_of
 from .generation import show_part, update_steps
 from .live import has_window
 from .part_mesh import build_part_mesh
@@ -33,13 +34,13 @@ def apply_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[tupl
     feature = recipe_of(obj.bubble_pattern).feature
     if any(recipe_of(owner.bubble_pattern).feature != feature for owner in owners):
         raise PatternError(
-            f'The patterns on "{base_object.name}" have holes of different kinds: give them the same depth '
-            "and sides, or apply one, and add the other to the part"
+            f'The patterns on "{base_object.name}" have different features: give them the same ones, or '
+            "apply one, and add the other to the part"
         )
     for owner in owners:
         settings = owner.bubble_pattern
         source = read_source(base_object, settings.region, context, recipe_of(settings))
-        if feature.depth is None:
+        if feature.through:
             check_one_side(source.base.mesh, source.selected)
         now = (source.fingerprint, source.size_trace)
         if now != (settings.fingerprint, settings.size_trace) or is_outdated(settings):
@@ -48,11 +49,14 @@ def apply_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[tupl
     pattern = joined([read_pattern(owner, base.mesh) for owner in owners])
     if not len(pattern):
         raise RegionError("The pattern has no features: make the pitch smaller or the region larger")
-    part = yield from part_steps(base.mesh, pattern, feature, is_long if has_window() else None)
+    stamp = stamp_of(feature, context)
+    part = yield from part_steps(base.mesh, pattern, feature, stamp, is_long if has_window() else None)
     yield Progress("Building the part", 1.0)
     mesh = build_part_mesh(
         f"{base_object.name} Part", part, pattern.places, base, original, obj.bubble_pattern.wall_material
     )
+    for owner in owners:
+        owner.bubble_pattern.part_removed = part.check.removed_volume
     return place_part(base_object, owners, mesh, verdict_of(part), context), part
 
 

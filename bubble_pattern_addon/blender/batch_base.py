@@ -6,7 +6,7 @@ writes.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,17 +16,18 @@ import bpy
 import numpy as np
 
 from ..core.errors import BaseError, OutputError
-from ..core.field_tables import NO_NAMES, Wanted, wanted, with_images
-from ..core.files import LoadedBase
+from ..core.field_tables import NO_NAMES, Wanted
+from ..core.files import LoadedBase, load_solids
 from ..core.mesh import Bools, Floats, Mesh
-from ..core.metric import Places
-from ..core.moving import moved_recipe
-from ..core.pattern import Pattern
+from ..core.moving import moved_pattern, moved_recipe
 from ..core.quality import measure
-from ..core.recipe import Recipe
+from ..core.recipe import KeepOut, Recipe
+from ..core.recipe_names import recipe_names, with_recipe_images
 from .applying import place_part, verdict_of
 from .attributes import CORNER_VERTEX, MATERIAL, write_values
+from .feature_objects import read_stamp as read_object_stamp
 from .generation import fill_settings, measured, put
+from .keep_outs import read_solids
 from .marked_side import on_marked_side
 from .part_mesh import build_part_mesh
 from .pattern_object import new_pattern_object
@@ -35,12 +36,13 @@ from .pixels import load_image
 from .pixels import read_image as read_image
 from .properties import is_pattern
 from .provenance import Original, read_original
-from .reading import Base, evaluated_mesh, transformed, world_frame
+from .reading import Base, evaluated_mesh, world_frame
 from .reading import read_base as read_object
 from .settings_recipe import recipe_of
 from .sources import read_source
 from .surroundings import read_painted, with_things
 from .target_region import ATTRIBUTE, store, stored
+from .units import scene_millimetres
 
 if TYPE_CHECKING:
     from ..batch import Run
@@ -75,9 +77,9 @@ def registered() -> Iterator[None]:
 # -- in ------------------------------------------------------------------------------------------------------
 
 
-def read_base(path: Path | None, names: Wanted = NO_NAMES) -> LoadedBase:
+def read_base(path: Path | None, names: Wanted = NO_NAMES, keep_outs: Sequence[KeepOut] = ()) -> LoadedBase:
     """The base in a .blend file, with its modifiers and in world coordinates, and of what is painted on it or
-    stands beside it what `names` asks for; None: in the file that is open.
+    stands beside it what `names` and `keep_outs` ask for; None: in the file that is open.
 
     Raises BaseError where the file is no .blend, or which of its objects is meant cannot be told.
     """
@@ -93,6 +95,7 @@ def read_base(path: Path | None, names: Wanted = NO_NAMES) -> LoadedBase:
             base = read_object(obj, mesh, WORLD)
             painted = read_painted(obj, mesh, base, replace(names, images=frozenset()))
         around = with_things(painted, names, WORLD, bpy.context)
+        solids = read_solids([entry for entry in keep_outs if entry.file is None], WORLD, bpy.context)
         marks = {name: on_marked_side(obj, base, name, mask) for name, mask in base.attributes.items()}
     return BlendBase(
         base.mesh,
@@ -102,6 +105,8 @@ def read_base(path: Path | None, names: Wanted = NO_NAMES) -> LoadedBase:
         values=around.attributes,
         uv_maps=around.uv_maps,
         objects=around.objects,
+        solids=solids,
+        millimetres=scene_millimetres(bpy.context.scene),
     )
 
 
@@ -123,6 +128,11 @@ def base_object() -> bpy.types.Object:
     raise BaseError(f"The .blend has {len(meshes)} mesh objects ({names}): make the base active, and save")
 
 
+def read_stamp(name: str) -> Mesh:
+    """The object of the open file with that name, as a feature."""
+    return read_object_stamp(name, bpy.context)
+
+
 # -- out -----------------------------------------------------------------------------------------------------
 
 
@@ -140,11 +150,11 @@ def write_blend(path: Path, run: Run) -> None:
             mark(base_obj, region, base, run.selected)
         pattern_obj = new_pattern_object(base_obj)
         to_frame = np.linalg.inv(world_frame(base_obj))
-        fill_settings(pattern_obj, base_obj, region, moved_recipe(with_images_in(run), to_frame, run.region))
+        fill_settings(pattern_obj, base_obj, region, moved_recipe(with_files_in(run), to_frame, run.region))
         recipe = recipe_of(pattern_obj.bubble_pattern)
         source = read_source(base_obj, region, bpy.context, recipe)
-        own = moved(run.pattern, to_frame)
-        laid = measured(own, source.region, measure(own, source.region))
+        own = moved_pattern(run.pattern, to_frame)
+        laid = measured(own, source.region, recipe, measure(own, source.region))
         laid = replace(laid, seconds=run.report["seconds"]["pack"])
         put(pattern_obj, source, recipe, laid)
         mesh = build_part_mesh(f"{base_obj.name} Part", run.part, run.pattern.places, base, original)
@@ -155,22 +165,34 @@ def write_blend(path: Path, run: Run) -> None:
             raise OutputError(f"{path.name} can't be written: {str(error).removeprefix('Error: ')}") from None
 
 
-def with_images_in(run: Run) -> Recipe:
-    """The recipe with the image files that it names taken into the open file, under names that fit there."""
-    packing, shaping = run.recipe.packing, run.recipe.shaping
+def with_files_in(run: Run) -> Recipe:
+    """The recipe with the image and mesh files that it names taken into the open file, under names that fit
+    there.
+    """
     names: dict[str, str] = {}
-    for name in sorted(wanted(packing.pitch, shaping.diameter).images):
+    for name in sorted(recipe_names(run.recipe).images):
         if (run.origin / name).is_file():
             image = load_image(run.origin / name)
             image.name = Path(name).name
             image.pack()
             image.use_fake_user = True  # a field that is kept as text does not hold it
             names[name] = image.name
-    return replace(
-        run.recipe,
-        packing=replace(packing, pitch=with_images(packing.pitch, names)),
-        shaping=replace(shaping, diameter=with_images(shaping.diameter, names)),
-    )
+    recipe = with_recipe_images(run.recipe, names)
+    keep_outs = tuple(with_object(entry, run) for entry in recipe.region.keep_out)
+    return replace(recipe, region=replace(recipe.region, keep_out=keep_outs))
+
+
+def with_object(keep_out: KeepOut, run: Run) -> KeepOut:
+    """The keep-out with the mesh file that it names as a hidden object of the open file."""
+    if keep_out.file is None:
+        return keep_out
+    [solid] = load_solids([keep_out.file], run.origin)["file", keep_out.file]
+    obj = bpy.data.objects.new(Path(keep_out.file).stem, mesh_of(solid.mesh))
+    bpy.context.scene.collection.objects.link(obj)
+    obj.hide_render = True
+    bpy.context.view_layer.update()
+    obj.hide_set(True)
+    return replace(keep_out, file=None, object=obj.name)
 
 
 def write_picture(path: Path, run: Run, size: tuple[int, int] = SIZE, up: Floats | None = None) -> None:
@@ -270,16 +292,3 @@ def mark(obj: bpy.types.Object, region: str, base: Base, selected: Bools) -> Non
     marked = np.zeros(len(obj.data.polygons), dtype=bool)
     marked[base.polygon[selected]] = True
     store(obj, region, marked)
-
-
-def moved(pattern: Pattern, matrix: Floats) -> Pattern:
-    """`pattern` after the rigid motion `matrix` (4, 4)."""
-    turn = matrix[:3, :3].T
-    places = pattern.places
-    return replace(
-        pattern,
-        places=Places(transformed(places.position, matrix), places.triangle, places.barycentric),
-        normal=pattern.normal @ turn,
-        tangent=pattern.tangent @ turn,
-        dropped=None if pattern.dropped is None else moved(pattern.dropped, matrix),
-    )

@@ -18,7 +18,7 @@ from bpy.props import (
 from ..core.toml_values import Point
 
 # What a kind starts with, relative to what the constant was: the second value, and how far it is to it.
-SECOND, WAY = {"pitch_field": 2.0, "diameter_field": 0.5}, 5.0
+SECOND, WAY = {"pitch_field": 2.0, "diameter_field": 0.5, "depth_field": 2.0, "aspect_field": 0.5}, 5.0
 
 
 def length_property(name: str, description: str, default: float = 0.0, **options: Any) -> Any:
@@ -63,9 +63,11 @@ def kind_changed(field: Any, context: bpy.types.Context) -> None:
     which = field.path_from_id().rpartition(".")[2]
     if field.kind not in {'CONSTANT', 'RECIPE'} and not field.begun and settings.live:
         settings.live = False
-        size = settings.pitch if which == "pitch_field" else settings.diameter
+        sizes = {"pitch_field": settings.pitch, "depth_field": settings.diameter / 4}
+        size = sizes.get(which, settings.diameter)
+        share = settings.aspect if which == "aspect_field" else settings.fill
         field.start_size, field.end_size = size, SECOND[which] * size
-        field.start_share, field.end_share = settings.fill, SECOND[which] * settings.fill
+        field.start_share, field.end_share = share, SECOND[which] * share
         field.distance = WAY * settings.pitch
         field.begun = True
         settings.live = True

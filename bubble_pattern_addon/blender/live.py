@@ -175,7 +175,8 @@ def can_be_looked_at(base: bpy.types.Object) -> bool:
 def is_behind(obj: bpy.types.Object) -> bool:
     """Whether the settings want another pattern than stands there, one that would not take long."""
     settings = obj.bubble_pattern
-    return is_outdated(settings) and not settings.trouble and settings.seconds <= PATIENCE
+    quick = settings.seconds <= PATIENCE and not settings.hand_made
+    return is_outdated(settings) and not settings.trouble and quick
 
 
 def patterns_shown() -> Iterator[tuple[bpy.types.Object, bpy.types.Context]]:

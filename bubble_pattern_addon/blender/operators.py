@@ -178,6 +178,20 @@ class BUBBLE_PATTERN_OT_update(OnPattern, LayingOperator, bpy.types.Operator):
         options={'HIDDEN', 'SKIP_SAVE'},
     )
 
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Ask before hand work is thrown away."""
+        settings = current_pattern(context).bubble_pattern
+        if not settings.hand_made:
+            return super().invoke(context, event)
+        return context.window_manager.invoke_confirm(  # type: ignore[no-any-return]
+            self,
+            event,
+            title="Lay the pattern anew?",
+            message="It was settled by hand. Only pinned features will stay where they are.",
+            confirm_text="Update",
+            icon='WARNING',
+        )
+
     def about(self, context: bpy.types.Context) -> int:
         number: int = current_pattern(context).session_uid
         return number
@@ -259,6 +273,7 @@ class BUBBLE_PATTERN_OT_remove(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         from . import generation
+        from .feature_shapes import drop_unused
 
         obj = current_pattern(context)
         settings = obj.bubble_pattern
@@ -269,6 +284,7 @@ class BUBBLE_PATTERN_OT_remove(bpy.types.Operator):
         if in_scene(base) and not keep:
             generation.show_part(obj, context, False)
         remove_object(obj)
+        drop_unused()
         if part is not None and not keep:
             remove_object(part)
         if not in_scene(base):

@@ -16,7 +16,9 @@ from . import (
     runs,
     shaping_panel,
 )
+from .presets import BUBBLE_PATTERN_PT_presets
 from .properties import in_scene, is_pattern, pattern_objects, pattern_of
+from .recipe_operators import draw_files
 from .settings_recipe import is_outdated
 from .sidebar import SidebarPanel, is_applied, large, sentences
 from .stepping import draw_progress
@@ -26,6 +28,11 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
     """Region, and the buttons."""
 
     bl_label = "Bubble Pattern"
+
+    def draw_header_preset(self, context: bpy.types.Context) -> None:
+        """Blender's menu of presets, where there is a pattern to lay by one."""
+        if pattern_of(context.active_object) is not None:
+            BUBBLE_PATTERN_PT_presets.draw_panel_header(self.layout)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, active = self.layout, context.active_object
@@ -94,12 +101,17 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
         layout.operator("bubble_pattern.remove", icon='TRASH')
 
     def draw_points(self, layout: bpy.types.UILayout, settings: Any) -> None:
-        """The points of the pattern are being edited: sizes can be fixed."""
+        """The points of the pattern are being edited: moved, pinned and settled, their sizes fixed."""
         count = settings.id_data.data.total_vert_sel
         text = f"{count:,} feature{'s' if count != 1 else ''} selected" if count else "Select features"
         layout.label(text=text, icon='VERTEXSEL')
-        large(layout).operator("bubble_pattern.fix_sizes", icon='PINNED')
-        layout.operator("bubble_pattern.free_sizes", icon='UNPINNED')
+        large(layout).operator("bubble_pattern.settle", icon='MOD_SMOOTH')
+        row = layout.row(align=True)
+        row.operator("bubble_pattern.pin", icon='PINNED')
+        row.operator("bubble_pattern.unpin", icon='UNPINNED')
+        row = layout.row(align=True)
+        row.operator("bubble_pattern.fix_sizes", icon='LOCKED')
+        row.operator("bubble_pattern.free_sizes", icon='UNLOCKED')
 
     def draw_applied(
         self, context: bpy.types.Context, layout: bpy.types.UILayout, obj: bpy.types.Object
@@ -112,6 +124,7 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
         else:
             layout.label(text=f"{settings.count:,} holes, watertight", icon='CHECKMARK')
         large(layout).operator("bubble_pattern.edit", icon='GREASEPENCIL')
+        draw_files(layout)
         layout.operator("bubble_pattern.remove", icon='TRASH')
 
 

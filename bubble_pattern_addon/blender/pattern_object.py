@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 import numpy as np
 from mathutils import Matrix
 
+from ..core.feature_recipe import SIZES
 from ..core.mesh import Floats, Ints, Mesh
 from ..core.metric import Places
-from ..core.pattern import Pattern, all_bubbles, split
+from ..core.pattern import Pattern, aimed, all_bubbles, split, take
 from .attributes import read_values, write_values
+from .point_marks import mark_pins, remember
+from .preview_nodes import show_shape
 from .reading import Base
 
 
@@ -37,10 +42,11 @@ def write_pattern(obj: bpy.types.Object, pattern: Pattern, base_object: bpy.type
     write_values(mesh, "row", 'POINT', 'INT', bubbles.row)
     write_values(mesh, "normal", 'POINT', 'FLOAT_VECTOR', bubbles.normal)
     write_values(mesh, "tangent", 'POINT', 'FLOAT_VECTOR', bubbles.tangent)
-    write_values(mesh, "rotation", 'POINT', 'QUATERNION', rotations(bubbles.normal, bubbles.tangent))
     write_values(mesh, "triangle", 'POINT', 'INT', bubbles.places.triangle)
     write_values(mesh, "barycentric", 'POINT', 'FLOAT_VECTOR', bubbles.places.barycentric)
     write_sizes(obj, pattern)
+    mark_pins(obj, bubbles.position, bubbles.pitch)
+    remember(obj, bubbles.position, bubbles.ids)
     mesh.update()
     obj.matrix_parent_inverse = base_object.matrix_world.inverted_safe()
     obj.matrix_basis = Matrix(base.frame.tolist())
@@ -77,8 +83,27 @@ def write_sizes(obj: bpy.types.Object, pattern: Pattern) -> None:
     own_mesh(obj)
     write_values(obj.data, "diameter", 'POINT', 'FLOAT', bubbles.diameter[row])
     write_values(obj.data, "wished", 'POINT', 'FLOAT', wished[row])
+    write_form(obj.data, take(bubbles, row))
+    show_shape(obj)
     obj.data.update_tag()
     obj.update_tag()
+
+
+def write_form(mesh: bpy.types.Mesh, bubbles: Pattern) -> None:
+    """How the features stand, and their sizes that vary over the region; what all have alike is taken off."""
+    stands = aimed(bubbles)
+    write_values(mesh, "rotation", 'POINT', 'QUATERNION', rotations(stands.normal, stands.tangent))
+    for name in ("axis", "heading"):
+        values = getattr(bubbles, name)
+        if values is not None:
+            write_values(mesh, name, 'POINT', 'FLOAT_VECTOR', values)
+        elif name in mesh.attributes:
+            mesh.attributes.remove(mesh.attributes[name])
+    for name in SIZES:
+        if name in bubbles.sizes:
+            write_values(mesh, name, 'POINT', 'FLOAT', bubbles.sizes[name])
+        elif name in mesh.attributes:
+            mesh.attributes.remove(mesh.attributes[name])
 
 
 def point_ids(obj: bpy.types.Object) -> Ints:
@@ -89,11 +114,14 @@ def point_ids(obj: bpy.types.Object) -> Ints:
 def read_pattern(obj: bpy.types.Object, mesh: Mesh) -> Pattern:
     """The pattern that the object's points carry, for the base geometry `mesh` it was made on.
 
-    Points that the user has deleted by hand are left out, and copies made by hand. Positions are taken from
+    Points that the user has deleted by hand are left out, and those made by hand. Positions are taken from
     the places on the base, which holds them on the surface to the last bit.
     """
     points = obj.data.attributes
-    ids, chosen = np.unique(point_ids(obj), return_index=True)
+    ids = point_ids(obj)
+    made = np.flatnonzero(read_values(points["pitch"].data, "value", np.float32) > 0)
+    ids, chosen = np.unique(ids[made], return_index=True)
+    chosen = made[chosen]
 
     def values(name: str, prop: str, dtype: type, width: int = 1) -> Floats:
         """Attribute `name` of the points in the order of ids, (n,), or (n, width) where that is above 1."""
@@ -104,6 +132,11 @@ def read_pattern(obj: bpy.types.Object, mesh: Mesh) -> Pattern:
     barycentric /= barycentric.sum(axis=1, keepdims=True)
     position = (mesh.vertices[mesh.triangles[triangle]] * barycentric[:, :, None]).sum(axis=1)
     known = "wished" in points  # files of 0.1 have none
+    ways: dict[str, Any] = {
+        name: unit(values(name, "vector", np.float32, 3).astype(np.float64)) if name in points else None
+        for name in ("axis", "heading")
+    }
+    sizes = {name: values(name, "value", np.float32).astype(np.float64) for name in SIZES if name in points}
     bubbles = Pattern(
         places=Places(position, triangle, barycentric),
         normal=unit(values("normal", "vector", np.float32, 3).astype(np.float64)),
@@ -113,6 +146,8 @@ def read_pattern(obj: bpy.types.Object, mesh: Mesh) -> Pattern:
         row=values("row", "value", np.int32).astype(np.int64),
         wished=values("wished", "value", np.float32).astype(np.float64) if known else None,
         bubble=None if np.array_equal(ids, np.arange(len(ids))) else ids,
+        **ways,
+        sizes=sizes,
     )
     return split(bubbles, bubbles.diameter > 0)
 

@@ -10,7 +10,7 @@ GROUP = "Bubble Pattern Preview"
 MODIFIER = "Bubble Pattern"
 MATERIAL = "Bubble Pattern Preview"
 VERSION_KEY = "bubble_pattern_version"
-VERSION = 2
+VERSION = 3
 
 # A disc is this thick relative to its diameter: it stands a little proud of a curved surface, seen from
 # either side.
@@ -42,6 +42,10 @@ def build(group: bpy.types.NodeTree) -> None:
     bubbles.description = "Draw the territory of every feature as a ring"
     material = new_socket("Material", in_out='INPUT', socket_type='NodeSocketMaterial')
     material.description = "Material of the previewed features"
+    shape = new_socket("Shape", in_out='INPUT', socket_type='NodeSocketObject')
+    shape.description = "What stands for a feature of the diameter 1, or nothing for a disc"
+    shaped = new_socket("Use Shape", in_out='INPUT', socket_type='NodeSocketBool')
+    shaped.description = "Show the shape in place of a disc"
     new_socket("Geometry", in_out='OUTPUT', socket_type='NodeSocketGeometry')
 
     node, link = group.nodes.new, group.links.new
@@ -55,7 +59,14 @@ def build(group: bpy.types.NodeTree) -> None:
     painted = node('GeometryNodeSetMaterial')
     link(disc.outputs["Mesh"], painted.inputs["Geometry"])
     link(given.outputs["Material"], painted.inputs["Material"])
-    features = instances(group, given, painted.outputs["Geometry"], rotation, "diameter")
+    own = node('GeometryNodeObjectInfo')
+    link(given.outputs["Shape"], own.inputs["Object"])
+    either = node('GeometryNodeSwitch')
+    either.input_type = 'GEOMETRY'
+    link(given.outputs["Use Shape"], either.inputs["Switch"])
+    link(painted.outputs["Geometry"], either.inputs["False"])
+    link(own.outputs["Geometry"], either.inputs["True"])
+    features = instances(group, given, either.outputs["Output"], rotation, "diameter")
     # none where the feature was left out, whose diameter is 0
     link(named_attribute(group, "diameter", 'FLOAT').outputs["Attribute"], features.inputs["Selection"])
 
@@ -107,18 +118,18 @@ def arrange(group: bpy.types.NodeTree) -> None:
         filled[at] = filled.get(at, 0) + 1
 
 
-def preview_material() -> bpy.types.Material:
-    """The dark material of the previewed features."""
-    material = bpy.data.materials.get(MATERIAL)
+def preview_material(name: str = MATERIAL, color: tuple[float, ...] = DARK) -> bpy.types.Material:
+    """The dark material of previewed holes, or another one."""
+    material = bpy.data.materials.get(name)
     if material is None:
-        material = bpy.data.materials.new(MATERIAL)
-        material.diffuse_color = DARK
+        material = bpy.data.materials.new(name)
+        material.diffuse_color = color
         material.roughness = 1.0
         if bpy.app.version < (5, 0, 0):  # from 5.0 on every material has nodes
             material.use_nodes = True
         shader = material.node_tree.nodes.get("Principled BSDF")
         if shader is not None:
-            shader.inputs["Base Color"].default_value = DARK
+            shader.inputs["Base Color"].default_value = color
             shader.inputs["Roughness"].default_value = 1.0
     return material
 
@@ -140,3 +151,17 @@ def show_preview(obj: bpy.types.Object, bubbles: bool = False) -> None:
     modifier.show_expanded = False
     set_input(modifier, "Material", preview_material())
     set_input(modifier, "Show Bubbles", bubbles)
+    show_shape(obj)
+
+
+def show_shape(obj: bpy.types.Object) -> None:
+    """Let what stands for the features look like them: see feature_shapes."""
+    from .feature_shapes import drop_unused, shape_object
+
+    modifier = obj.modifiers.get(MODIFIER)
+    if modifier is None or modifier.node_group is None:
+        return
+    shape = shape_object(obj)
+    set_input(modifier, "Shape", shape)
+    set_input(modifier, "Use Shape", shape is not None)
+    drop_unused()

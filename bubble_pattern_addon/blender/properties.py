@@ -10,15 +10,17 @@ from bpy.props import BoolProperty, PointerProperty
 
 from .feature_properties import FeatureSettings
 from .field_properties import BubblePatternField
+from .keep_out_properties import BubblePatternKeepOut
 from .limit_properties import LimitSettings
-from .packing_properties import PackingSettings
+from .packing_properties import BubblePatternPin, PackingSettings
 from .reacting import redraw_preview, show_cut
 from .region_properties import RegionSettings
-from .result_properties import ResultSettings
+from .result_properties import BubblePatternBroken, ResultSettings
 from .shaping_properties import BubblePatternSeed, ShapingSettings
+from .solve_properties import SolveSettings
 
 # Raised when a property changes its meaning; see upgrade.
-SETTINGS_VERSION = 2
+SETTINGS_VERSION = 3
 
 
 def is_on(settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
@@ -37,6 +39,7 @@ class BubblePatternSettings(
     ShapingSettings,
     FeatureSettings,
     LimitSettings,
+    SolveSettings,
     ResultSettings,
     bpy.types.PropertyGroup,
 ):
@@ -104,7 +107,14 @@ def pattern_of(obj: bpy.types.Object | None) -> bpy.types.Object | None:
     return on_base[0] if on_base else None
 
 
-CLASSES = (BubblePatternField, BubblePatternSeed, BubblePatternSettings)
+CLASSES = (
+    BubblePatternField,
+    BubblePatternKeepOut,
+    BubblePatternPin,
+    BubblePatternSeed,
+    BubblePatternBroken,
+    BubblePatternSettings,
+)
 _register, _unregister = bpy.utils.register_classes_factory(CLASSES)
 
 

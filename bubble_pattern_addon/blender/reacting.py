@@ -12,6 +12,13 @@ def reshape(settings: bpy.types.PropertyGroup, context: bpy.types.Context) -> No
     generation.react(settings, context, repack=False)
 
 
+def reshape_feature(settings: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    """What a feature is, or how it stands, changed."""
+    reshape(settings, context)
+    if settings.made_with:  # else there are no points yet
+        redraw_preview(settings, context)
+
+
 def repack(settings: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
     """A setting of the packing changed: the bubbles move."""
     from . import generation

@@ -10,23 +10,27 @@ import bpy
 
 from ..core.blending import Fill
 from ..core.errors import PatternError, RecipeError
+from ..core.keep_out_checks import check_keep_outs
 from ..core.metric import Constant, Described
-from ..core.recipe import Feature, Limits, Packing, Recipe, RegionChoice, Seed, Shaping
+from ..core.recipe import Packing, Recipe, RegionChoice, Seed, Shaping
 from ..core.recipe_checks import check_recipe
 from ..core.recipe_file import recipe_to_toml
+from .feature_settings import feature_of, placing, take_feature
 from .field_properties import point_of, typed
 from .field_recipe import described, take
+from .keep_out_properties import is_given, keep_out_of, take_keep_out
+from .making_recipe import limits_of, output_of, shaping_output, sizes_of, take_limits, take_sizes
 from .properties import BubblePatternSettings
 
 
 def recipe_of(settings: Any) -> Recipe:
     """The recipe that `settings` stand for. Raises RecipeError where they contradict one another."""
-    through = settings.depth_mode == 'THROUGH'
     recipe = Recipe(
         region=RegionChoice(
             attribute=settings.region or None,
             parts=(parts := tuple(name.strip() for name in settings.parts.split(",") if name.strip())),
             gap=typed(settings.gap) if parts else 0.0,
+            keep_out=tuple(keep_out_of(entry) for entry in settings.keep_out if is_given(entry)),
         ),
         packing=Packing(
             pitch=described(settings.pitch_field, settings.pitch, False, "[packing] pitch"),
@@ -42,6 +46,7 @@ def recipe_of(settings: Any) -> Recipe:
             seed=settings.seed,
             iterations=settings.iterations,
             tolerance=typed(settings.tolerance),
+            pins=tuple(point_of(pin.at) for pin in settings.pins),
         ),
         shaping=Shaping(
             diameter=diameter_of(settings),
@@ -49,18 +54,13 @@ def recipe_of(settings: Any) -> Recipe:
             solver=settings.solver.lower(),
             tolerance=typed(settings.shaping_tolerance),
             iterations=settings.shaping_iterations,
+            sizes=sizes_of(settings),
         ),
-        feature=Feature(
-            depth=None if through else typed(settings.depth),
-            sides=settings.sides or None,
-            tolerance=typed(settings.facet_tolerance) or None,
-        ),
-        limits=Limits(
-            min_web=typed(settings.min_web),
-            min_margin=typed(settings.min_margin),
-            min_diameter=typed(settings.min_diameter),
-        ),
+        feature=feature_of(settings),
+        limits=limits_of(settings),
+        output=output_of(settings),
     )
+    check_keep_outs(recipe.region)
     check_recipe(recipe)
     return recipe
 
@@ -77,17 +77,14 @@ def take_recipe(settings: Any, recipe: Recipe) -> None:
     live, settings.live = settings.live, False  # one change after the other would lay a pattern each time
     settings.parts = ", ".join(recipe.region.parts)
     settings.gap = recipe.region.gap
+    settings.keep_out.clear()
+    for keep_out in recipe.region.keep_out:
+        take_keep_out(settings.keep_out.add(), keep_out)
     take_packing(settings, recipe.packing)
     take_shaping(settings, recipe.shaping)
-    feature = recipe.feature
-    settings.depth_mode = 'THROUGH' if feature.depth is None else 'BLIND'
-    if feature.depth is not None:
-        settings.depth = feature.depth
-    settings.sides = feature.sides or 0
-    settings.facet_tolerance = feature.tolerance or 0.0
-    settings.min_web = recipe.limits.min_web
-    settings.min_margin = recipe.limits.min_margin
-    settings.min_diameter = recipe.limits.min_diameter
+    take_feature(settings, recipe.feature)
+    take_limits(settings, recipe.limits)
+    settings.density = recipe.output.density or 0.0
     settings.live = live
 
 
@@ -129,6 +126,9 @@ def take_packing(settings: Any, packing: Packing) -> None:
     settings.seed = packing.seed
     settings.iterations = packing.iterations
     settings.tolerance = packing.tolerance
+    settings.pins.clear()
+    for pin in packing.pins:
+        settings.pins.add().at = pin
 
 
 def take_shaping(settings: Any, shaping: Shaping) -> None:
@@ -148,6 +148,7 @@ def take_shaping(settings: Any, shaping: Shaping) -> None:
     settings.solver = shaping.solver.upper()
     settings.shaping_tolerance = shaping.tolerance
     settings.shaping_iterations = shaping.iterations
+    take_sizes(settings, shaping.sizes)
 
 
 def packing_text(recipe: Recipe) -> str:
@@ -157,7 +158,11 @@ def packing_text(recipe: Recipe) -> str:
 
 def recipe_text(recipe: Recipe) -> str:
     """What the pattern's points depend on, as text; how the features are cut is left out."""
-    return recipe_to_toml(replace(recipe, feature=Feature()))
+    # the rules of a process depend on how deep a feature is
+    feature = placing(recipe.feature)
+    if recipe.limits.process is not None:
+        feature = replace(feature, depth=recipe.feature.depth)
+    return recipe_to_toml(replace(recipe, feature=feature, output=shaping_output(recipe)))
 
 
 def is_outdated(settings: Any) -> bool:

@@ -13,16 +13,18 @@ from typing import Any, NamedTuple
 import bpy
 
 from ..core.errors import BaseError
-from ..core.field_tables import Wanted, wanted
-from ..core.mesh import Bools
+from ..core.field_tables import Wanted
+from ..core.mesh import Bools, Ints
 from ..core.recipe import Recipe, RegionChoice
+from ..core.recipe_names import both, packing_names, shaping_names
 from ..core.region import Region, make_region
 from ..core.selection import select, sub_regions
 from ..core.surroundings import Surroundings
 from .cut_preview import hide_cut
+from .keep_outs import cut_to_choice
 from .marked_side import on_marked_side
 from .reading import Base, evaluated_mesh, read_base, shown
-from .surroundings import both, images_of, read_painted, trace, with_things
+from .surroundings import images_of, read_painted, trace, with_things
 from .watching import Stamp, forgetters, stamp_of
 
 # So many readings are kept: those of the patterns on one part.
@@ -51,6 +53,7 @@ class Reading(NamedTuple):
     selected: Bools
     painted: Surroundings
     fingerprint: str
+    parts: Ints | None
 
 
 _remembered: OrderedDict[Any, tuple[Stamp, Reading]] = OrderedDict()
@@ -70,7 +73,9 @@ def read_source(
     pitch_names, size_names = (Wanted(), Wanted()) if recipe is None else names_of(recipe)
     names = both(pitch_names, size_names)
     choice = RegionChoice(attribute=attribute) if recipe is None else recipe.region
-    reading = reading_of(obj, attribute, choice, names, context)
+    reading = reading_of(obj, attribute, replace(choice, keep_out=()), names, context)
+    if choice.keep_out:
+        reading = less_keep_outs(reading, choice, context)
     painted = replace(reading.painted, images=images_of(names.images))
     surroundings = with_things(painted, names, reading.base.frame, context)
     return Source(
@@ -84,8 +89,8 @@ def read_source(
 
 
 def names_of(recipe: Recipe) -> tuple[Wanted, Wanted]:
-    """What the packing metric asks its surroundings for, and what the shaping metric does."""
-    return wanted(recipe.packing.pitch), wanted(recipe.shaping.diameter)
+    """What the packing metric asks its surroundings for, and what shaping the features does."""
+    return packing_names(recipe), shaping_names(recipe)
 
 
 def reading_of(
@@ -96,7 +101,7 @@ def reading_of(
         raise BaseError(f'"{obj.name}" is not in this view layer: include its collection')
     hide_cut(obj)
     context.evaluated_depsgraph_get()  # so that every change so far is in the stamp
-    on_base = Wanted(names.attributes, names.materials, names.uv_maps)
+    on_base = replace(names, objects=frozenset(), images=frozenset())
     materials = tuple(slot.material.name if slot.material else "" for slot in obj.material_slots)
     key = (obj.session_uid, context.scene.session_uid, attribute, choice, on_base, materials)
     stamp = stamp_of(obj)
@@ -125,4 +130,13 @@ def read(
     selected = on_marked_side(obj, base, attribute, selected)
     parts = sub_regions(choice, base.attributes, base.materials)
     region = make_region(base.mesh, selected, parts, choice.gap)
-    return Reading(base, region, selected, painted, base.fingerprint(selected, parts))
+    return Reading(base, region, selected, painted, base.fingerprint(selected, parts), parts)
+
+
+def less_keep_outs(reading: Reading, choice: RegionChoice, context: bpy.types.Context) -> Reading:
+    """The reading with what the choice keeps out cut out of its region; what that is counts for the
+    fingerprint.
+    """
+    base, selected, parts = reading.base, reading.selected, reading.parts
+    region, trace = cut_to_choice(base, selected, parts, choice, reading.fingerprint, context)
+    return reading._replace(region=region, fingerprint=reading.fingerprint + trace)

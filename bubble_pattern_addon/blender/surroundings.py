@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import astuple, fields, replace
+from dataclasses import astuple, replace
 from typing import Any
 
 import bpy
@@ -37,11 +37,6 @@ SOLID_TYPES = {'MESH', 'CURVE', 'CURVES', 'SURFACE', 'FONT', 'META'}
 SPACING = 1 / 60
 
 
-def both(one: Wanted, other: Wanted) -> Wanted:
-    """The names of both."""
-    return Wanted(**{part.name: getattr(one, part.name) | getattr(other, part.name) for part in fields(one)})
-
-
 def read_painted(obj: bpy.types.Object, mesh: bpy.types.Mesh, base: Base, names: Wanted) -> Surroundings:
     """What is painted on `mesh`, the evaluated mesh of `obj` that was read as `base`, and images."""
     return Surroundings(
@@ -49,6 +44,7 @@ def read_painted(obj: bpy.types.Object, mesh: bpy.types.Mesh, base: Base, names:
         materials=base.materials,
         uv_maps=uv_maps_of(mesh, base) if names.uv_maps else {},
         images=images_of(names.images),
+        vectors=vectors_of(mesh, base, names.vectors),
     )
 
 
@@ -109,6 +105,22 @@ def at_corners(attribute: bpy.types.Attribute, base: Base) -> Floats:
     if attribute.domain == 'FACE' and values.ndim == 2:
         taken = np.repeat(taken[:, None], 3, axis=1)
     return taken
+
+
+def vectors_of(mesh: bpy.types.Mesh, base: Base, names: frozenset[str]) -> Mapping[str, Floats]:
+    """Attributes of vectors at the triangles' corners, (T, 3, 3), turned as the base is."""
+    known = {entry.name: entry for entry in mesh.attributes if entry.data_type == 'FLOAT_VECTOR'}
+    found: dict[str, Floats] = {}
+    for name in names if names <= known.keys() else known:
+        values = read_values(known[name].data, "vector", np.float32, 3).astype(np.float64)
+        rows: Mapping[str, Ints] = {
+            'POINT': base.mesh.triangles,
+            'CORNER': base.corners,
+            'FACE': np.repeat(base.polygon[:, None], 3, axis=1),
+        }
+        if known[name].domain in rows:
+            found[name] = values[rows[known[name].domain]] @ base.to_frame[:3, :3].T
+    return found
 
 
 def weights_of(obj: bpy.types.Object, mesh: bpy.types.Mesh, base: Base) -> Mapping[str, Floats]:
@@ -190,6 +202,7 @@ def trace(surroundings: Surroundings, names: Wanted) -> str:
         (names.materials, surroundings.materials),
         (names.uv_maps, surroundings.uv_maps),
         (names.images, surroundings.images),
+        (names.vectors, surroundings.vectors),
     )
     for chosen, table in tables:
         for name in sorted(chosen & table.keys()):

@@ -163,6 +163,7 @@ class Wanted:
     uv_maps: frozenset[str] = frozenset()
     images: frozenset[str] = frozenset()
     objects: frozenset[str] = frozenset()
+    vectors: frozenset[str] = frozenset()
 
 
 NO_NAMES = Wanted()

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -27,7 +27,8 @@ class Pattern:
     pitch: (n,) packing metric at the bubble: the diameter of its territory
     diameter: (n,) size of the feature, from the shaping metric, within the limits
     row: (n,) 0 for the first row along a boundary, 1 for the next, ...
-    wished: (n,) the size that the shaping metric asked for; None where nothing is known of it
+    wished: (n,) the size that the shaping metric asked for, of nominal sizes the nearest smaller one; None
+    where nothing is known of it
     bubble: (n,) number of the feature's bubble, rising; None where every bubble has a feature
     dropped: the bubbles whose feature was left out as too small; None where none was
     notes: what a designer should know of the pattern, one sentence each
@@ -35,6 +36,10 @@ class Pattern:
     symmetry: the recipe's word for the symmetry that the bubbles have, None without one
     partners: (n, k) for each of its isometries, the first of which leaves everything where it is, the id of
     the bubble to which it takes this one: of its own where it is on the plane or axis
+    axis: (n, 3) unit vectors along which the features stand, None for the normals
+    heading: (n, 3) unit vectors square to the axes, the features' x axes, None for the tangents
+    sizes: (n,) by the name of a feature's size that varies over the region, such as its depth
+    share: (n,) share of the circle of its diameter that a feature takes, None for all of it
     """
 
     places: Places
@@ -50,6 +55,10 @@ class Pattern:
     packing_notes: tuple[str, ...] = ()
     symmetry: str | None = None
     partners: Ints | None = None
+    axis: Floats | None = None
+    heading: Floats | None = None
+    sizes: Mapping[str, Floats] = field(default_factory=dict)
+    share: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.pitch)
@@ -70,6 +79,17 @@ class Pattern:
         if self.wished is None:
             return np.empty(0, dtype=np.int64)
         return np.flatnonzero(self.diameter < self.wished * (1 - SAME))
+
+
+def aimed(pattern: Pattern) -> Pattern:
+    """The pattern with its features' axes for normals and their headings for tangents."""
+    if pattern.axis is None and pattern.heading is None:
+        return pattern
+    return replace(
+        pattern,
+        normal=pattern.normal if pattern.axis is None else pattern.axis,
+        tangent=pattern.tangent if pattern.heading is None else pattern.heading,
+    )
 
 
 def split(bubbles: Pattern, kept: Bools) -> Pattern:
@@ -137,6 +157,25 @@ def _end_to_end(parts: Sequence[Pattern]) -> Pattern:
         packing_notes=tuple(dict.fromkeys(note for part in parts for note in part.packing_notes)),
         symmetry=parts[0].symmetry if symmetric else None,
         partners=column("partners") if symmetric else None,
+        axis=_given(parts, "axis", lambda part: part.normal),
+        heading=_given(parts, "heading", lambda part: part.tangent),
+        share=_given(parts, "share", lambda part: np.ones(len(part))),
+        # what only some of the parts have varies with no field that all have
+        sizes={
+            name: np.concatenate([part.sizes[name] for part in parts])
+            for name in parts[0].sizes
+            if all(name in part.sizes for part in parts)
+        },
+    )
+
+
+def _given(parts: Sequence[Pattern], name: str, otherwise: Callable[[Pattern], Floats]) -> Floats | None:
+    """A column that a part may lack, where it is as `otherwise`; None where all lack it."""
+    given = [getattr(part, name) for part in parts]
+    if all(column is None for column in given):
+        return None
+    return np.concatenate(
+        [otherwise(part) if one is None else one for one, part in zip(given, parts, strict=True)]
     )
 
 
@@ -150,5 +189,9 @@ def take(pattern: Pattern, which: Bools | Ints) -> Pattern:
         wished=None if pattern.wished is None else pattern.wished[which],
         bubble=pattern.ids[which],
         partners=None if pattern.partners is None else pattern.partners[which],
+        axis=None if pattern.axis is None else pattern.axis[which],
+        heading=None if pattern.heading is None else pattern.heading[which],
+        sizes={name: values[which] for name, values in pattern.sizes.items()},
+        share=None if pattern.share is None else pattern.share[which],
         dropped=None,
     )

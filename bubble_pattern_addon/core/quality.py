@@ -117,8 +117,9 @@ def min_margin(pattern: Pattern, region: Region) -> float:
 
 
 def open_area(pattern: Pattern, region: Region) -> float:
-    """Share of the region's area, 0 to 1, that the features take, as circles of their diameter."""
-    return float(np.pi / 4 * (pattern.diameter**2).sum() / region.area)
+    """Share of the region's area, 0 to 1, that the features take at the surface, rim and draft included."""
+    share = 1.0 if pattern.share is None else pattern.share
+    return float(np.pi / 4 * (share * pattern.diameter**2).sum() / region.area)
 
 
 @dataclass(frozen=True)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from .errors import FieldError
-from .mesh import Bools, Floats
+from .mesh import Bools, Floats, Mesh
 from .metric import Field
 from .toml_values import nearest, show
 
@@ -34,6 +34,18 @@ class Thing:
 
 
 @dataclass(frozen=True)
+class Solid:
+    """A body beside the base, in the base's coordinates; axis: (3,) its own Z axis."""
+
+    mesh: Mesh
+    axis: Floats
+
+
+# Bodies that keep-outs name, by key and name: ("object", "Boss"), ("collection", "Bosses"), ("file", "a.stl")
+Solids = Mapping[tuple[str, str], Sequence[Solid]]
+
+
+@dataclass(frozen=True)
 class Surroundings:
     """Everything by name that a field may ask for; T is the number of the base's triangles.
 
@@ -45,6 +57,7 @@ class Surroundings:
     images: (height, width, 1 to 4) from 0 to 1, the bottom row first; grey, grey and alpha, or colours, as
     stored in the file: a picture's middle grey is 0.5
     objects: what stands beside the base
+    vectors: (T, 3, 3) at the triangles' corners, in the base's coordinates
     pitch: the packing metric, bound; for diameters that are a share of it
     """
 
@@ -55,6 +68,7 @@ class Surroundings:
     images: Mapping[str, Floats] = field(default_factory=dict)
     objects: Mapping[str, Thing] = field(default_factory=dict)
     pitch: Field | None = None
+    vectors: Mapping[str, Floats] = field(default_factory=dict)
 
     def target(self) -> Region:
         """The region. FieldError where there is none."""
@@ -72,6 +86,17 @@ class Surroundings:
         if values.ndim != 1:
             raise FieldError(f"attribute = {show(name)} is painted on vertices: give one of the faces")
         return values
+
+    def vector(self, name: str) -> Floats:
+        """Vectors at the triangles' corners, (T, 3, 3); three attributes of one number each, with _x, _y and
+        _z behind the name, make one too. FieldError where the base has none of either.
+        """
+        keys = [f"{name}_{axis}" for axis in "xyz"]
+        if name not in self.vectors and all(key in self.attributes for key in keys):
+            parts = [self.attributes[key] for key in keys]
+            if all(part.ndim == 2 for part in parts):
+                return np.stack(parts, axis=2)
+        return _named(self.vectors, "name", name, "the base has no attribute of vectors of that name")
 
     def material(self, name: str) -> Bools:
         """Triangles with a material, (T,). FieldError where the base has no such one."""

@@ -41,6 +41,12 @@ class Fault(IntEnum):
     BREAKS = 5
     MEETS = 6
     COVERED = 7
+    CLOSED = 8
+    RIM = 9
+    FLAT = 10
+    STEEP_CAP = 11
+    THIN = 12
+    AVERTED = 13
 
 
 @dataclass(frozen=True)
@@ -53,6 +59,8 @@ class NearWall:
     far_high: highest point of that far side
     bottom: where a through cutter ends, clear of the far side and of the next wall
     fault: Fault of a through-hole there
+    surface_low, surface_high: lowest and highest point of the surface under the disc
+    over: height of what hangs above the surface, inf where nothing does
     seen_feature, seen_triangle, seen_low, seen_high: (k,) every triangle with a part inside a feature's
         cylinder
         and the heights of that part
@@ -65,6 +73,9 @@ class NearWall:
     far_high: Floats
     bottom: Floats
     fault: Ints
+    surface_low: Floats
+    surface_high: Floats
+    over: Floats
     seen_feature: Ints
     seen_triangle: Ints
     seen_low: Floats
@@ -72,19 +83,26 @@ class NearWall:
     seen_axis: Floats
 
 
-def near_wall(base: Mesh, tree: BoxTree, pattern: Pattern, deepest: Floats) -> NearWall:
-    """Wall under every feature of `pattern`, looked for down to `deepest`, (n,), below its centre."""
+def near_wall(
+    base: Mesh, tree: BoxTree, pattern: Pattern, deepest: Floats, highest: Floats | None = None
+) -> NearWall:
+    """Wall under every feature of `pattern`, looked for down to `deepest`, (n,), below its centre, along its
+    normal; at least up to `highest`, (n,).
+    """
+    highest = np.zeros(len(pattern)) if highest is None else highest
     blocks = []
     for start in range(0, max(len(pattern), 1), BLOCK):
         ids = np.arange(start, min(start + BLOCK, len(pattern)))
-        blocks.append(_look(base, tree, pattern, ids, deepest[ids]))
+        blocks.append(_look(base, tree, pattern, ids, deepest[ids], highest[ids]))
     return NearWall(*(np.concatenate(parts) for parts in zip(*blocks, strict=True)))
 
 
-def _look(base: Mesh, tree: BoxTree, pattern: Pattern, ids: Ints, deepest: Floats) -> tuple[np.ndarray, ...]:
+def _look(
+    base: Mesh, tree: BoxTree, pattern: Pattern, ids: Ints, deepest: Floats, highest: Floats
+) -> tuple[np.ndarray, ...]:
     """One block of `near_wall`: the fields of NearWall."""
     centre, normal, radius = pattern.position[ids], pattern.normal[ids], pattern.diameter[ids] / 2
-    up = (STEEPEST + 2 * CLEARANCE) * radius
+    up = np.maximum((STEEPEST + 2 * CLEARANCE) * radius, highest + CLEARANCE * radius)
     down = deepest + 2 * radius
     owner, triangle = meeting_cylinders(
         tree, centre + up[:, None] * normal, centre - down[:, None] * normal, radius
@@ -126,7 +144,8 @@ def _look(base: Mesh, tree: BoxTree, pattern: Pattern, ids: Ints, deepest: Float
     fault[(surface_high > STEEPEST * radius) | (surface_low < -STEEPEST * radius)] = Fault.FOLDED
     fault[~on_base] = Fault.OFF
     seen = (ids[owner], triangle, spans.low, spans.high, spans.axis)
-    return (thickness, top, far_low, far_high, bottom, fault, *seen)
+    surface = (surface_low, surface_high, over)
+    return (thickness, top, far_low, far_high, bottom, fault, *surface, *seen)
 
 
 def _local(base: Mesh, pattern: Pattern, ids: Ints, owner: Ints, triangle: Ints) -> Floats:

@@ -105,7 +105,7 @@ def points(pattern: bpy.types.Object, name: str = "position") -> np.ndarray:
     bpy.context.view_layer.update()
     data = pattern.data.attributes[name].data
     matrix = np.array(pattern.matrix_world)
-    if name in {"position", "normal", "tangent"}:
+    if name in {"position", "normal", "tangent", "axis", "heading"}:
         values = np.array([item.vector for item in data]).reshape(-1, 3)
         return values @ matrix[:3, :3].T + (matrix[:3, 3] if name == "position" else 0)
     return np.array([item.value for item in data])

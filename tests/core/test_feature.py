@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from bubble_pattern_addon.core.closed import measure
 from bubble_pattern_addon.core.errors import RecipeError
-from bubble_pattern_addon.core.feature import make_cutters, sides
+from bubble_pattern_addon.core.feature import make_cutters
+from bubble_pattern_addon.core.feature_sizes import sides
 from bubble_pattern_addon.core.recipe import Feature
 from tests.core.bases import hexagons, laid, polygon_area
 

@@ -382,7 +382,7 @@ def test_a_folded_sliver_dissolves_without_harm_and_is_told(depth):
 @pytest.mark.parametrize("harm", ["swap", "move", "dent"])
 def test_a_change_where_no_hole_is_is_a_problem(monkeypatch, harm):
     base = slab(12)
-    whole = solid.subtract
+    whole = solid.combine
 
     def harmed(*given):
         left = whole(*given)
@@ -405,7 +405,7 @@ def test_a_change_where_no_hole_is_is_a_problem(monkeypatch, harm):
         return Cut(Mesh(vertices, np.concatenate([triangles, left.walls])), face, left.facet)
 
     base_square = [*base.triangles[0], base.triangles[144, 2]]
-    monkeypatch.setattr(solid, "subtract", harmed)
+    monkeypatch.setattr(solid, "combine", harmed)
     part = make(base, laid([[0, 0, 4.0]], UP, 3, 0.5))
     assert part.check.watertight
     assert not part.check.unchanged
@@ -530,13 +530,13 @@ def test_any_plate_however_it_lies(width, depth, thickness, share, pitch, sides,
 
 def test_a_base_that_is_cut_away_altogether_leaves_nothing(monkeypatch):
     base, pattern = plate(), laid([[0, 0, 0]], UP, 3, 1.8)
-    whole = solid.subtract
+    whole = solid.combine
 
-    def all_of_it(mesh, face, cutters):
+    def all_of_it(mesh, face, cutters, adds):
         lid = box((-99, -99, -99), (99, 99, 99))
-        return whole(mesh, face, replace(cutters, mesh=lid, facet=np.zeros(12, dtype=np.int64)))
+        return whole(mesh, face, replace(cutters, mesh=lid, facet=np.zeros(12, dtype=np.int64)), adds)
 
-    monkeypatch.setattr(solid, "subtract", all_of_it)
+    monkeypatch.setattr(solid, "combine", all_of_it)
     part = make(base, pattern)
     assert len(part.mesh.triangles) == 0
     assert not part.check.watertight

@@ -23,6 +23,7 @@ from .swarm import (
     Links,
     Swarm,
     Work,
+    along_surface,
     bubbles_of,
     land,
     links_of,
@@ -160,6 +161,8 @@ def _block(swarm: Swarm, fire: Fire, links: Links, law: Law, steps: int) -> Link
     for _ in range(steps):
         pull = pull_on(swarm, links, law)
         velocity += fire.pace * pull
+        # The surface has turned away under those who moved on: what leads off it would carry them off it.
+        along_surface(swarm, active, velocity)
         if _dot(pull, velocity) > 0:
             size = np.sqrt(_dot(velocity, velocity) / _dot(pull, pull))
             velocity += fire.mixing * (size * pull - velocity)

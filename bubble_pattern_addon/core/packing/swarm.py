@@ -182,10 +182,15 @@ def pull_on(swarm: Swarm, links: Links, law: Law) -> Floats:
     away *= (law(distance * links.softness) * links.softness / np.maximum(distance, 1e-300))[:, None]
     pull = (links.incidence @ away)[:-1]
     pull *= links.pitch
+    along_surface(swarm, active, pull)
+    return pull
+
+
+def along_surface(swarm: Swarm, active: Ints, vectors: Floats) -> None:
+    """Take from the `vectors` (a, 3) of the active bubbles what is square to the surface where they stand."""
     if not swarm.ground.charts.region.flat:
         normal = swarm.normal[active]
-        pull -= np.einsum("nc,nc->n", pull, normal)[:, None] * normal
-    return pull
+        vectors -= np.einsum("nc,nc->n", vectors, normal)[:, None] * normal
 
 
 def move(swarm: Swarm, links: Links, steps: Floats, longest: float) -> None:

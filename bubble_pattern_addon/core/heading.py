@@ -1,0 +1,196 @@
+"""How every feature stands: its axis, where its profile heads, and its sizes that vary over the region."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .distance import nearest_directions
+from .errors import FieldError, RecipeError
+from .feature_checks import STEEPEST_DRAFT
+from .feature_recipe import ASPECTS, Feature
+from .links import Links
+from .mesh import Floats
+from .metric import Described, Field
+from .painted import painted
+from .pattern import Pattern
+from .profile import outlines, signed_area
+from .surroundings import Surroundings
+
+# A direction this much shorter than it was, once laid square to the axis, points nowhere.
+NOWHERE = 1e-6
+# The surface bends as much one way as the other where the normals of neighbours differ by less, in radians.
+EVEN_BEND = 2e-3
+# what a size must be above, and at most
+RANGES = {
+    "depth": (0.0, np.inf),
+    "height": (0.0, np.inf),
+    "draft": (-1e-12, STEEPEST_DRAFT),
+    "aspect": (0.0, 1.0),
+    "angle": (-np.inf, np.inf),
+}
+
+
+def headed(bubbles: Pattern, links: Links, feature: Feature, surroundings: Surroundings) -> Pattern:
+    """The bubbles with the axes, headings and varying sizes of their features; None and nothing where they
+    are the bubbles' own, the same for all.
+
+    surroundings: with the region. FieldError for what they lack, RecipeError for a size out of its range.
+    """
+    pitch = bubbles.pitch
+    here = replace(surroundings, pitch=lambda places: pitch)
+    sizes = {}
+    for name in RANGES:
+        size = getattr(feature, name)
+        if isinstance(size, Described):
+            sizes[name] = _laid(size, name, bubbles, here)
+    plain_angle = 0.0 if isinstance(feature.angle, Described) else feature.angle
+    angle = np.radians(sizes.pop("angle", np.full(1, plain_angle)))
+    share = circle_share(feature, sizes.get("aspect"), len(bubbles))
+    if feature.axis == 0 and feature.turn == "row" and not np.any(angle):
+        return replace(bubbles, axis=None, heading=None, sizes=sizes, share=share)
+    axis = axes(bubbles.normal, feature)
+    heading = square_to(axis, bubbles.tangent)
+    if feature.turn != "row":
+        wished = _directions(bubbles, axis, heading, links, feature, surroundings)
+        heading = square_to(axis, wished, heading)
+    heading = turned(axis, heading, angle)
+    axis_given = None if feature.axis == 0 else axis
+    return replace(bubbles, axis=axis_given, heading=heading, sizes=sizes, share=share)
+
+
+def _laid(described: Described, name: str, bubbles: Pattern, surroundings: Surroundings) -> Floats:
+    """Values of a field at the bubbles, (n,)."""
+    try:
+        field: Field = described.bind(surroundings)
+    except FieldError as error:
+        raise FieldError(f"[feature] {name}: {error}") from None
+    values = field(bubbles.places)
+    low, high = RANGES[name]
+    if not (np.isfinite(values).all() and (values > low).all() and (values <= high).all()):
+        raise RecipeError(
+            f"[feature] {name} becomes {values.min():.4g} to {values.max():.4g} in the target region: "
+            f"it must be above {max(low, 0):g} and at most {high:g}"
+            if np.isfinite(high)
+            else f"[feature] {name} becomes {values.min():.4g} in the target region: it must stay above 0"
+        )
+    return values
+
+
+def circle_share(feature: Feature, aspect: Floats | None, count: int) -> Floats | None:
+    """Share of the circle round it that each of `count` features takes, (n,); None where it is the circle.
+
+    aspect: (n,) where it varies over the region. A mesh counts as its circle: its area is not looked at.
+    """
+    if feature.profile in ("circle", "mesh"):
+        return None
+    given = ASPECTS.get(feature.profile, 1.0) if feature.aspect is None else feature.aspect
+    if aspect is None:
+        assert not isinstance(given, Described)  # a field has been laid
+        aspect = np.full(1, given)
+    # as fine as makes no difference
+    corners = outlines(feature, np.full(len(aspect), 2.0), aspect, 256).corners
+    return np.broadcast_to(signed_area(corners) / np.pi, count).copy()
+
+
+def axes(normal: Floats, feature: Feature) -> Floats:
+    """Unit axes of features on a surface with these normals, (n, 3)."""
+    if feature.axis == 0 or feature.pull is None:
+        return normal
+    pull = np.array(feature.pull) / np.linalg.norm(feature.pull)
+    mixed = (1 - feature.axis) * normal + feature.axis * pull
+    length = np.linalg.norm(mixed, axis=1, keepdims=True)
+    # half way to the opposite side is no direction
+    return np.where(length > NOWHERE, mixed / np.where(length > NOWHERE, length, 1), normal)
+
+
+def square_to(axis: Floats, direction: Floats, otherwise: Floats | None = None) -> Floats:
+    """Unit vectors (n, 3) square to the axes, along the directions; `otherwise`, or any, where there is
+    none.
+    """
+    flat = direction - np.einsum("ij,ij->i", direction, axis)[:, None] * axis
+    length = np.linalg.norm(flat, axis=1)
+    lost = ~(length > NOWHERE * np.linalg.norm(direction, axis=1))
+    if otherwise is not None:
+        flat[lost] = otherwise[lost]
+    elif lost.any():
+        flat[lost] = np.cross(axis[lost], np.eye(3)[np.abs(axis[lost]).argmin(axis=1)])
+    return flat / np.linalg.norm(flat, axis=1, keepdims=True)
+
+
+def turned(axis: Floats, heading: Floats, angle: Floats) -> Floats:
+    """Headings turned about their axes by the angle, (n,) or (1,), counter-clockwise seen from outside."""
+    if not np.any(angle):
+        return heading
+    cosine, sine = np.cos(angle), np.sin(angle)
+    across = np.cross(axis, heading)
+    return np.asarray((heading.T * cosine + across.T * sine).T)
+
+
+def _directions(
+    bubbles: Pattern,
+    axis: Floats,
+    row: Floats,
+    links: Links,
+    feature: Feature,
+    surroundings: Surroundings,
+) -> Floats:
+    """Where the profiles should head, (n, 3); row: (n, 3) along the rows, square to the axes."""
+    position, turn = bubbles.position, feature.turn
+    if turn == "fixed":
+        return np.broadcast_to(np.array(feature.turn_direction, dtype=np.float64), position.shape)
+    if turn == "boundary":
+        region = surroundings.target()
+        if not len(region.rim):
+            raise FieldError(
+                '[feature] turn = "boundary": the target region is closed, without a boundary: use another'
+            )
+        return nearest_directions(region.boundary_segments, position)
+    if turn == "attribute":
+        assert feature.turn_attribute is not None  # check has seen to it
+        try:
+            return painted(surroundings.vector(feature.turn_attribute), bubbles.places)
+        except FieldError as error:
+            raise FieldError(f"[feature] turn_attribute: {error}") from None
+    if turn == "curvature":
+        return least_bent(bubbles, row, links)
+    if turn == "random":
+        # by the bubble's number: leaving one out turns no other
+        angles = np.random.default_rng(feature.turn_seed).random(int(bubbles.ids.max(initial=0)) + 1)
+        return turned(axis, row, 2 * np.pi * angles[bubbles.ids])
+    towards = np.array(feature.turn_point, dtype=np.float64) - position
+    return towards if turn == "towards" else np.cross(axis, towards)
+
+
+def least_bent(bubbles: Pattern, row: Floats, links: Links) -> Floats:
+    """Directions (n, 3) in which the surface bends least, such as along a tube; `row` (n, 3) where it bends
+    alike every way.
+
+    The change of the normal from each bubble to its neighbours is fitted by a linear map, as in a discrete
+    second fundamental form; so what counts is the bend on the scale of the pattern, not of its base's faces.
+    """
+    n = len(bubbles)
+    normal, position = bubbles.normal, bubbles.position
+    x = square_to(normal, row)
+    frame = np.stack([x, np.cross(normal, x)], axis=1)
+    own = np.concatenate([links.first, links.second])
+    other = np.concatenate([links.second, links.first])
+    step = np.einsum("mij,mj->mi", frame[own], position[other] - position[own])
+    bend = np.einsum("mij,mj->mi", frame[own], normal[other] - normal[own])
+    squares, products = np.zeros((2, n, 2, 2))
+    for i in range(2):
+        for j in range(2):
+            squares[:, i, j] = np.bincount(own, step[:, i] * step[:, j], n)
+            products[:, i, j] = np.bincount(own, bend[:, i] * step[:, j], n)
+    size = np.trace(squares, axis1=1, axis2=2)
+    known = np.linalg.det(squares) > 1e-6 * size**2
+    squares[~known] = np.eye(2)
+    shape = products @ np.linalg.inv(squares)
+    value, vector = np.linalg.eigh((shape + shape.transpose(0, 2, 1)) / 2)
+    flattest = np.abs(value).argmin(axis=1)
+    flat = vector[np.arange(n), :, flattest]
+    uneven = np.abs(np.abs(value[:, 1]) - np.abs(value[:, 0])) * bubbles.pitch > EVEN_BEND
+    flat = np.where(flat[:, :1] < 0, -flat, flat)
+    direction = np.einsum("ni,nij->nj", flat, frame)
+    return np.where((known & uneven)[:, None], direction, row)
