@@ -76,7 +76,7 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
         trouble = settings.trouble or live.trouble_of(obj)
         outdated = bool(trouble) or is_outdated(settings)
         run = runs.under_way()
-        if run is not None:
+        if run is not None and not run.ended:
             draw_progress(layout, run)
         if is_pattern(context.active_object) and context.mode == 'EDIT_MESH':
             self.draw_points(layout, settings)
