@@ -24,6 +24,7 @@ LENGTHS = {
     "shaping": ("diameter", "seeds", "sizes"),
     "feature": ("depth", "height", "tolerance", "rim_size", "turn_point"),
     "limits": ("min_web", "min_margin", "min_diameter", "thickness"),
+    "solve": (),
     "output": (),
 }
 # To so many digits: 1.2 mm are 0.0012 m, not 0.0011999999999999999.
