@@ -156,3 +156,12 @@ def test_what_is_drawn_is_in_the_recipe_file() -> None:
     assert recipe.output.projection == (0, -1, 0)
     assert recipe.output.unit == 2.5
     assert recipe_from_dict(tomllib.loads(recipe_to_toml(recipe))) == recipe
+
+
+def test_sizes_and_thickness_are_lengths_and_a_series_is_none() -> None:
+    text = "[region]\nall = true\n[shaping]\nsizes = {}\n[limits]\nprocess = \"cnc\"\nthickness = 2.0\n"
+    listed = scaled_recipe(recipe_from_dict(tomllib.loads(text.format("[1.0, 2.5]"))), 0.001)
+    assert listed.shaping.sizes == (0.001, 0.0025)
+    assert listed.limits.thickness == 0.002
+    named = scaled_recipe(recipe_from_dict(tomllib.loads(text.format('"R10"'))), 0.001)
+    assert named.shaping.sizes == "R10"
