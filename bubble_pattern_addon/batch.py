@@ -20,6 +20,9 @@ from typing import Any, NoReturn, Protocol, cast
 
 import numpy as np
 
+from .core.drawing import Drawing, make_drawing
+from .core.drawing_files import drawing_report, write_drawing
+from .core.drawn_shapes import drawn_shapes
 from .core.errors import BaseError, FieldError, OutputError, PatternError
 from .core.export import make_report, write_features, write_report
 from .core.feature_recipe import nouns
@@ -33,6 +36,7 @@ from .core.progress import Progress, Result, Steps, drive, within
 from .core.recipe import KeepOut, Recipe, RegionChoice, default_recipe
 from .core.recipe_file import load_recipe, recipe_to_toml
 from .core.recipe_names import recipe_names, with_recipe_images
+from .core.recipe_units import load_fitted_recipe
 from .core.region import Region
 from .core.selection import select, sub_regions
 from .core.sides import check_one_side
@@ -40,6 +44,7 @@ from .core.solid import Part, part_steps
 from .core.solving import solving_steps
 from .core.soundness import sound_base
 from .core.surroundings import Surroundings
+from .core.units import millimetres_in
 from .terminal import line_on, silenced
 
 EXAMPLE = """\
@@ -61,7 +66,8 @@ example of a run:
 class Run:
     """Everything a batch run knows when the part is made.
 
-    selected: (T,) the target region's triangles; origin: the folder from which the recipe names its images
+    selected: (T,) the target region's triangles; origin: the folder from which the recipe names its images;
+    drawing: of the pattern, where the recipe asks for one; millimetres: in a unit of the base
     """
 
     recipe: Recipe
@@ -72,6 +78,8 @@ class Run:
     part: Part
     report: Mapping[str, Any]
     origin: Path = Path()
+    drawing: Drawing | None = None
+    millimetres: float = 1.0
 
 
 class BlenderSide(Protocol):
@@ -110,14 +118,15 @@ def run_steps(base: LoadedBase, recipe_file: Path) -> Steps[Run]:
     """
     clock = Clock()
     yield Progress("Reading the region", 0.0)
-    choice = load_recipe(recipe_file).region
+    choice = recipe_for(base, recipe_file).region
     selected = select(base.mesh, choice, base.attributes, base.materials)
     parts = sub_regions(choice, base.attributes, base.materials)
     masks = {**base.materials, **base.attributes}
     files = [keep_out.file for keep_out in choice.keep_out if keep_out.file is not None]
     solids = {**base.solids, **load_solids(files, recipe_file.parent)}
     region = region_with_keep_outs(base.mesh, selected, parts, choice.gap, choice.keep_out, masks, solids)
-    recipe = load_recipe(recipe_file, default_recipe(region.area, region.perimeter))
+    recipe = recipe_for(base, recipe_file, region)
+    millimetres = base.millimetres or millimetres_in(recipe.output.unit or "mm")
     sound_base(base.mesh)  # step 3 looks again; but nobody shall wait for a packing to be told of a hole
     if recipe.feature.through:
         check_one_side(base.mesh, selected)
@@ -129,12 +138,28 @@ def run_steps(base: LoadedBase, recipe_file: Path) -> Steps[Run]:
         recipe, pattern = solved.recipe, solved.pattern
     else:
         pattern = yield from clock.timed(within(pattern_steps(region, recipe, surroundings), 0.0, 0.5))
+    drawing = draw(region, pattern, recipe, millimetres) if recipe.output.drawings else None
     part = yield from within(part_steps(base.mesh, pattern, recipe.feature, stamp), 0.5, 1.0)
     clock.stop("add")
-    report = make_report(region, pattern, part, clock.seconds, recipe, solved)
+    report = make_report(region, pattern, part, clock.seconds, recipe, solved) | drawing_report(drawing)
     if part.check.problems:
         raise BaseError(f"The part is not good: {' '.join(part.check.problems)}")
-    return Run(recipe, base, selected, region, pattern, part, report, recipe_file.parent)
+    origin = recipe_file.parent
+    return Run(recipe, base, selected, region, pattern, part, report, origin, drawing, millimetres)
+
+
+def recipe_for(base: LoadedBase, recipe_file: Path, region: Region | None = None) -> Recipe:
+    """The recipe in a file, in the unit of the base where both say theirs, with what it leaves out fitted to
+    the region.
+    """
+    fitting = Recipe() if region is None else default_recipe(region.area, region.perimeter)
+    return load_fitted_recipe(recipe_file, fitting, base.millimetres)
+
+
+def draw(region: Region, pattern: Pattern, recipe: Recipe, millimetres: float) -> Drawing:
+    """The drawing that the recipe asks for. RegionError where the region can't be drawn so."""
+    shapes = drawn_shapes(pattern, recipe.feature)
+    return make_drawing(region, pattern, recipe.output.projection, recipe.output.align, millimetres, shapes)
 
 
 def read_images(recipe: Recipe, folder: Path) -> dict[str, Floats]:
@@ -217,7 +242,10 @@ def write_run(run: Run, folder: Path, blender: Callable[[], BlenderSide]) -> Non
     """All files of a run, into a folder that is there (see files.output_folder)."""
     write_mesh(folder / "part.stl", run.part.mesh)
     for name in run.recipe.output.formats:
-        write_mesh(folder / f"part.{name}", run.part.mesh)
+        write_mesh(folder / f"part.{name}", run.part.mesh, run.millimetres)
+    for name in run.recipe.output.drawings:
+        assert run.drawing is not None
+        write_drawing(folder / f"pattern.{name}", run.drawing)
     write_features(folder / "features.csv", run.pattern)
     write_report(folder / "report.json", run.report)
     recipe = with_copied_files(run, folder)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from . import (
     command,
+    export_operator,
     fixed_sizes,
     hand_work,
     keep_outs,
@@ -12,7 +13,9 @@ from . import (
     operators,
     overlay,
     panels,
+    presets,
     properties,
+    recipe_operators,
     runs,
     solving,
     versioning,
@@ -30,6 +33,9 @@ MODULES = (
     keep_outs,
     solving,
     offenders,
+    recipe_operators,
+    export_operator,
+    presets,
     panels,
     versioning,
     overlay,

@@ -19,9 +19,7 @@ from ..core.errors import BaseError, OutputError
 from ..core.field_tables import NO_NAMES, Wanted
 from ..core.files import LoadedBase, load_solids
 from ..core.mesh import Bools, Floats, Mesh
-from ..core.metric import Places
-from ..core.moving import moved_recipe
-from ..core.pattern import Pattern
+from ..core.moving import moved_pattern, moved_recipe
 from ..core.quality import measure
 from ..core.recipe import KeepOut, Recipe
 from ..core.recipe_names import recipe_names, with_recipe_images
@@ -38,12 +36,13 @@ from .pixels import load_image
 from .pixels import read_image as read_image
 from .properties import is_pattern
 from .provenance import Original, read_original
-from .reading import Base, evaluated_mesh, transformed, world_frame
+from .reading import Base, evaluated_mesh, world_frame
 from .reading import read_base as read_object
 from .settings_recipe import recipe_of
 from .sources import read_source
 from .surroundings import read_painted, with_things
 from .target_region import ATTRIBUTE, store, stored
+from .units import scene_millimetres
 
 if TYPE_CHECKING:
     from ..batch import Run
@@ -107,6 +106,7 @@ def read_base(path: Path | None, names: Wanted = NO_NAMES, keep_outs: Sequence[K
         uv_maps=around.uv_maps,
         objects=around.objects,
         solids=solids,
+        millimetres=scene_millimetres(bpy.context.scene),
     )
 
 
@@ -153,7 +153,7 @@ def write_blend(path: Path, run: Run) -> None:
         fill_settings(pattern_obj, base_obj, region, moved_recipe(with_files_in(run), to_frame, run.region))
         recipe = recipe_of(pattern_obj.bubble_pattern)
         source = read_source(base_obj, region, bpy.context, recipe)
-        own = moved(run.pattern, to_frame)
+        own = moved_pattern(run.pattern, to_frame)
         laid = measured(own, source.region, recipe, measure(own, source.region))
         laid = replace(laid, seconds=run.report["seconds"]["pack"])
         put(pattern_obj, source, recipe, laid)
@@ -292,16 +292,3 @@ def mark(obj: bpy.types.Object, region: str, base: Base, selected: Bools) -> Non
     marked = np.zeros(len(obj.data.polygons), dtype=bool)
     marked[base.polygon[selected]] = True
     store(obj, region, marked)
-
-
-def moved(pattern: Pattern, matrix: Floats) -> Pattern:
-    """`pattern` after the rigid motion `matrix` (4, 4)."""
-    turn = matrix[:3, :3].T
-    places = pattern.places
-    return replace(
-        pattern,
-        places=Places(transformed(places.position, matrix), places.triangle, places.barycentric),
-        normal=pattern.normal @ turn,
-        tangent=pattern.tangent @ turn,
-        dropped=None if pattern.dropped is None else moved(pattern.dropped, matrix),
-    )

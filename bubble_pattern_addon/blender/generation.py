@@ -23,7 +23,7 @@ from ..core.recipe_file import recipe_from_dict
 from ..core.region import Region
 from ..core.results import Results, results_of
 from ..core.shaping import reshaped
-from . import live, runs
+from . import live
 from .noting import note_quality, note_results, noted_quality
 from .pattern_object import read_pattern, write_pattern, write_sizes
 from .preview_nodes import show_preview
@@ -127,13 +127,12 @@ def update_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[Non
 def react(settings: Any, context: bpy.types.Context, repack: bool) -> None:
     """Answer a change of a setting in the panel: lay or shape the pattern anew; see live."""
     obj = settings.id_data
-    if not answers(settings, context):
+    if not answers(settings, context) or live.is_taken_up(obj):
         return
     if settings.hand_made and (repack or not is_only_shape(settings)):
         return  # hand work is not thrown away without being asked
     try:
         if not repack and is_only_shape(settings):
-            runs.stop()
             reshape(obj, context)
         elif live.has_window():
             live.lay(obj, context, update_steps(obj, context), settings.seconds)

@@ -16,7 +16,9 @@ from . import (
     runs,
     shaping_panel,
 )
+from .presets import BUBBLE_PATTERN_PT_presets
 from .properties import in_scene, is_pattern, pattern_objects, pattern_of
+from .recipe_operators import draw_files
 from .settings_recipe import is_outdated
 from .sidebar import SidebarPanel, is_applied, large, sentences
 from .stepping import draw_progress
@@ -26,6 +28,11 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
     """Region, and the buttons."""
 
     bl_label = "Bubble Pattern"
+
+    def draw_header_preset(self, context: bpy.types.Context) -> None:
+        """Blender's menu of presets, where there is a pattern to lay by one."""
+        if pattern_of(context.active_object) is not None:
+            BUBBLE_PATTERN_PT_presets.draw_panel_header(self.layout)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, active = self.layout, context.active_object
@@ -69,7 +76,7 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
         trouble = settings.trouble or live.trouble_of(obj)
         outdated = bool(trouble) or is_outdated(settings)
         run = runs.under_way()
-        if run is not None:
+        if run is not None and not run.ended:
             draw_progress(layout, run)
         if is_pattern(context.active_object) and context.mode == 'EDIT_MESH':
             self.draw_points(layout, settings)
@@ -117,6 +124,7 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
         else:
             layout.label(text=f"{settings.count:,} holes, watertight", icon='CHECKMARK')
         large(layout).operator("bubble_pattern.edit", icon='GREASEPENCIL')
+        draw_files(layout)
         layout.operator("bubble_pattern.remove", icon='TRASH')
 
 

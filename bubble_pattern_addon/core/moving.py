@@ -1,4 +1,4 @@
-"""A recipe seen from another frame: its points and directions after a rigid motion."""
+"""A recipe and a pattern seen from another frame: their points and directions after a rigid motion."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from .blending import FaceSet
 from .feature_recipe import Feature
 from .keep_out import frame_along
 from .mesh import Floats
-from .metric import Described
+from .metric import Described, Places
 from .painted import Image, mean_normal, upward
+from .pattern import Pattern
 from .recipe import KeepOut, Recipe
 from .region import Region
 from .toml_values import Point
@@ -29,21 +30,51 @@ def moved_recipe(recipe: Recipe, matrix: Floats, region: Region) -> Recipe:
     if np.array_equal(matrix, np.eye(4)):
         return recipe
     packing, shaping, choice = recipe.packing, recipe.shaping, recipe.region
-    orientation = packing.orientation
+    orientation, projection = packing.orientation, recipe.output.projection
     if not isinstance(orientation, str):
         orientation = _turned(orientation, matrix)
+    if not isinstance(projection, str):
+        projection = _turned(projection, matrix)
+    centre = packing.symmetry_centre
     keep_outs = tuple(_moved_keep_out(keep_out, matrix) for keep_out in choice.keep_out)
-    pins = tuple(_moved_point(pin, matrix) for pin in packing.pins)
     near = None if choice.near is None else _moved_point(choice.near, matrix)
     seeds = tuple(replace(seed, at=_moved_point(seed.at, matrix)) for seed in shaping.seeds)
     return replace(
         recipe,
         region=replace(choice, near=near, keep_out=keep_outs),
         packing=replace(
-            packing, pitch=moved(packing.pitch, matrix, region), orientation=orientation, pins=pins
+            packing,
+            pitch=moved(packing.pitch, matrix, region),
+            orientation=orientation,
+            symmetry_centre=None if centre is None else _moved_point(centre, matrix),
+            pins=tuple(_moved_point(pin, matrix) for pin in packing.pins),
         ),
         shaping=replace(shaping, diameter=moved(shaping.diameter, matrix, region), seeds=seeds),
         feature=moved_feature(recipe.feature, matrix, region),
+        output=replace(recipe.output, projection=projection),
+    )
+
+
+def moved_pattern(pattern: Pattern, matrix: Floats, factor: float = 1.0) -> Pattern:
+    """`pattern` after the rigid motion `matrix` (4, 4), and then `factor` times as large."""
+    turn = matrix[:3, :3].T
+    places = pattern.places
+    position = (places.position @ turn + matrix[:3, 3]) * factor
+    return replace(
+        pattern,
+        places=Places(position, places.triangle, places.barycentric),
+        normal=pattern.normal @ turn,
+        tangent=pattern.tangent @ turn,
+        pitch=pattern.pitch * factor,
+        diameter=pattern.diameter * factor,
+        wished=None if pattern.wished is None else pattern.wished * factor,
+        axis=None if pattern.axis is None else pattern.axis @ turn,
+        heading=None if pattern.heading is None else pattern.heading @ turn,
+        sizes={
+            name: values * factor if name in ("depth", "height") else values
+            for name, values in pattern.sizes.items()
+        },
+        dropped=None if pattern.dropped is None else moved_pattern(pattern.dropped, matrix, factor),
     )
 
 

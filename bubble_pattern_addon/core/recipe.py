@@ -22,6 +22,9 @@ INTEGRATORS = ("fire", "rk4")
 ORIENTATIONS = ("edge", "best")
 SOLVERS = ("direct", "iterate")
 FORMATS = ("stl", "obj", "ply", "3mf", "glb")
+DRAWINGS = ("dxf", "svg")
+PROJECTIONS = ("flat", "normal")
+ALIGNMENTS = ("base", "rows")
 
 FILL = 0.6  # a feature's diameter relative to the pitch where the recipe gives only one of them
 FEATURES_WISHED = 500  # how many features a recipe that gives no length at all aims at
@@ -167,6 +170,8 @@ class Output:
     formats: the part in these formats too (see FORMATS); blend: the base with the editable pattern as
     pattern.blend; picture: a rendered view of the part as part.png
     density: of the part's material in g/cm3, for the mass of what is removed
+    drawings: of the pattern, in these formats (see DRAWINGS), as pattern.dxf and so on; projection, align:
+    how it is drawn, see drawing.make_drawing
     unit: that of the recipe's lengths (see core.units), and of the base where its file does not say; None:
     that of the base, or millimetres
     """
@@ -175,6 +180,9 @@ class Output:
     picture: bool = False
     formats: tuple[str, ...] = ()
     density: float | None = None
+    drawings: tuple[str, ...] = ()
+    projection: str | Point = "flat"
+    align: str = "base"
     unit: Unit | None = None
 
 

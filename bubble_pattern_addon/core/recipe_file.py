@@ -108,7 +108,7 @@ def _refuse_unknown(data: Mapping[str, Any]) -> None:
 # -- readers: the right type or a RecipeError that names the key ---------------------------------------------
 
 
-def _orientation(value: object, where: str) -> str | Point:
+def _word_or_vector(value: object, where: str) -> str | Point:
     return point(value, where) if isinstance(value, list) else text(value, where)
 
 
@@ -173,7 +173,7 @@ READERS: dict[str, dict[str, Callable[[object, str], Any]]] = {
     "packing": {
         "pitch": field_from_toml,
         "edge_offset": number,
-        "orientation": _orientation,
+        "orientation": _word_or_vector,
         "integrator": text,
         "seed": whole,
         "iterations": whole,
@@ -198,7 +198,16 @@ READERS: dict[str, dict[str, Callable[[object, str], Any]]] = {
         "check_only": flag,
     },
     "solve": {"open_area": number, "count": whole, "by": text},
-    "output": {"blend": flag, "picture": flag, "formats": texts, "density": number, "unit": read_unit},
+    "output": {
+        "blend": flag,
+        "picture": flag,
+        "formats": texts,
+        "density": number,
+        "drawings": texts,
+        "projection": _word_or_vector,
+        "align": text,
+        "unit": read_unit,
+    },
 }
 
 

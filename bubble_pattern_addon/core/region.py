@@ -168,7 +168,7 @@ def region_of(
     if part is not None:
         shared = (neighbours >= 0) & (part[neighbours] != part[:, None])
         neighbours, opposite = np.where(shared, -1, neighbours), np.where(shared, -1, opposite)
-    loops, rim = _boundary_loops(rows, neighbours, opposite)
+    loops, rim = boundary_loops(rows, neighbours, opposite)
     reserve = np.where(shared[rim[:, 0], rim[:, 1]], gap / 2, 0.0)
     return Region(
         base,
@@ -248,7 +248,7 @@ def _sheets(neighbours: Ints) -> Ints:
     return connected_components(links, directed=False)[1].astype(np.int64)
 
 
-def _boundary_loops(rows: Ints, neighbours: Ints, opposite: Ints) -> tuple[tuple[Ints, ...], Ints]:
+def boundary_loops(rows: Ints, neighbours: Ints, opposite: Ints) -> tuple[tuple[Ints, ...], Ints]:
     """Boundary edges chained into loops: vertex rows per loop, and all edges as (row, opposite corner) in
     loop order.
     """
