@@ -31,7 +31,7 @@ from .core.files import LoadedBase, load_base, output_folder, write_mesh
 from .core.mesh import Bools, Floats, Mesh
 from .core.pattern import Pattern
 from .core.pipeline import pattern_steps
-from .core.progress import Progress, Steps, drive, within
+from .core.progress import Progress, Result, Steps, drive, within
 from .core.recipe import Recipe, default_recipe
 from .core.recipe_file import load_recipe, recipe_to_toml
 from .core.recipe_names import recipe_names, with_recipe_images
@@ -40,6 +40,7 @@ from .core.region import Region, make_region
 from .core.selection import select, sub_regions
 from .core.sides import check_one_side
 from .core.solid import Part, part_steps
+from .core.solving import solving_steps
 from .core.soundness import sound_base
 from .core.surroundings import Surroundings
 from .core.units import millimetres_in
@@ -127,12 +128,17 @@ def run_steps(base: LoadedBase, recipe_file: Path) -> Steps[Run]:
         check_one_side(base.mesh, selected)
     surroundings = surroundings_of(base, read_images(recipe, recipe_file.parent))
     clock.stop("region")
-    stamp = read_stamp(recipe, recipe_file.parent)
-    pattern = yield from clock.timed(within(pattern_steps(region, recipe, surroundings), 0.0, 0.5))
+    stamp, solved = read_stamp(recipe, recipe_file.parent), None
+    if recipe.solve:
+        solved = yield from clock.timed(within(solving_steps(region, recipe, surroundings), 0.0, 0.5))
+        recipe, pattern = solved.recipe, solved.pattern
+    else:
+        pattern = yield from clock.timed(within(pattern_steps(region, recipe, surroundings), 0.0, 0.5))
     drawing = draw(region, pattern, recipe, millimetres) if recipe.output.drawings else None
     part = yield from within(part_steps(base.mesh, pattern, recipe.feature, stamp), 0.5, 1.0)
     clock.stop("add")
-    report = make_report(region, pattern, part, clock.seconds) | drawing_report(drawing)
+    report = make_report(region, pattern, part, clock.seconds, recipe, solved)
+    report |= drawing_report(drawing)
     if part.check.problems:
         raise BaseError(f"The part is not good: {' '.join(part.check.problems)}")
     origin = recipe_file.parent
@@ -214,7 +220,7 @@ class Clock:
         self.seconds[stage] = self.seconds.get(stage, 0.0) + now - self.last
         self.last = now
 
-    def timed(self, steps: Steps[Pattern]) -> Steps[Pattern]:
+    def timed(self, steps: Steps[Result]) -> Steps[Result]:
         """Pass steps 1 and 2 on, and book what follows a "Shaping" on the stage shape, all else on pack."""
         stage = "pack"
         while True:
@@ -370,8 +376,12 @@ def summary(run: Run, out: Path) -> str:
     limits = figures["limits"]
     cut = "".join(f", {limits[key]:,} {key}" for key in ("shrunk", "dropped") if limits[key])
     share = "open" if figures["kind"] == "hole" else "covered"
+    rules = "".join(
+        f", {len(rule['ids']):,} break{'s' if len(rule['ids']) == 1 else ''} the {rule['rule']} rule"
+        for rule in figures["broken"]
+    )
     return (
         f"{nouns(figures['kind'], figures['features'])}, {100 * figures['open_area']:.1f} % {share}"
-        f"{webs}{cut}; "
+        f"{webs}{cut}{rules}; "
         f"watertight part in {out / 'part.stl'}"
     )

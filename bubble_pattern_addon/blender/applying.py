@@ -55,6 +55,8 @@ def apply_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[tupl
     mesh = build_part_mesh(
         f"{base_object.name} Part", part, pattern.places, base, original, obj.bubble_pattern.wall_material
     )
+    for owner in owners:
+        owner.bubble_pattern.part_removed = part.check.removed_volume
     return place_part(base_object, owners, mesh, verdict_of(part), context), part
 
 

@@ -151,7 +151,7 @@ def write_blend(path: Path, run: Run) -> None:
         recipe = recipe_of(pattern_obj.bubble_pattern)
         source = read_source(base_obj, region, bpy.context, recipe)
         own = moved_pattern(run.pattern, to_frame)
-        laid = measured(own, source.region, measure(own, source.region))
+        laid = measured(own, source.region, recipe, measure(own, source.region))
         laid = replace(laid, seconds=run.report["seconds"]["pack"])
         put(pattern_obj, source, recipe, laid)
         mesh = build_part_mesh(f"{base_obj.name} Part", run.part, run.pattern.places, base, original)

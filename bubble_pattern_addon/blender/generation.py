@@ -12,18 +12,19 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import bpy
-import numpy as np
 
 from ..core.errors import PatternError
 from ..core.pattern import Pattern
 from ..core.pipeline import pattern_steps
 from ..core.progress import Progress, Result, Steps, drive
-from ..core.quality import Quality, measure, min_margin, min_web, open_area
+from ..core.quality import Quality, measure
 from ..core.recipe import Recipe, RegionChoice, default_recipe
 from ..core.recipe_file import recipe_from_dict
 from ..core.region import Region
+from ..core.results import Results, results_of
 from ..core.shaping import reshaped
 from . import live, runs
+from .noting import note_quality, note_results, noted_quality
 from .pattern_object import read_pattern, write_pattern, write_sizes
 from .preview_nodes import show_preview
 from .properties import SETTINGS_VERSION, in_scene, pattern_objects
@@ -40,9 +41,7 @@ class Laid:
 
     pattern: Pattern
     quality: Quality
-    web: float
-    margin: float
-    open_area: float
+    results: Results
     seconds: float = 0.0
 
 
@@ -68,7 +67,7 @@ def laying_steps(source: Source, recipe: Recipe) -> Steps[Laid]:
     packing = pattern_steps(source.region, recipe, source.surroundings)
     pattern, seconds = yield from timed(packing)
     yield Progress("Measuring", 1.0)
-    laid = measured(pattern, source.region, measure(pattern, source.region))
+    laid = measured(pattern, source.region, recipe, measure(pattern, source.region))
     return replace(laid, seconds=seconds)
 
 
@@ -85,9 +84,9 @@ def timed(steps: Steps[Result]) -> Steps[tuple[Result, float]]:
         yield progress
 
 
-def measured(pattern: Pattern, region: Region, quality: Quality) -> Laid:
+def measured(pattern: Pattern, region: Region, recipe: Recipe, quality: Quality) -> Laid:
     """`pattern` with its figures."""
-    return Laid(pattern, quality, min_web(pattern), min_margin(pattern, region), open_area(pattern, region))
+    return Laid(pattern, quality, results_of(pattern, region, recipe))
 
 
 def put(obj: bpy.types.Object, source: Source, recipe: Recipe, laid: Laid) -> None:
@@ -95,8 +94,7 @@ def put(obj: bpy.types.Object, source: Source, recipe: Recipe, laid: Laid) -> No
     settings = obj.bubble_pattern
     write_pattern(obj, laid.pattern, settings.base, source.base)
     note(settings, source, recipe, laid)
-    settings.six = laid.quality.six if np.isfinite(laid.quality.six) else -1.0
-    settings.gap_min = laid.quality.gap_min if np.isfinite(laid.quality.gap_min) else -1.0
+    note_quality(settings, laid.quality)
     settings.seconds = laid.seconds
     show_preview(obj, settings.show_bubbles)
 
@@ -109,13 +107,10 @@ def note(settings: Any, source: Source, recipe: Recipe, laid: Laid) -> None:
     settings.version = SETTINGS_VERSION
     settings.trouble = settings.cut_trouble = ""
     live.note_base(settings.id_data)
-    settings.count = len(laid.pattern)
     settings.shrunk = len(laid.pattern.shrunk)
     settings.dropped = 0 if laid.pattern.dropped is None else len(laid.pattern.dropped)
     settings.notes = " ".join(laid.pattern.notes)
-    settings.web = laid.web if np.isfinite(laid.web) else -1.0
-    settings.margin = laid.margin if np.isfinite(laid.margin) else -1.0
-    settings.open_area = laid.open_area
+    note_results(settings, laid.pattern, laid.results)
 
 
 def update_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[None]:
@@ -174,8 +169,7 @@ def reshape(obj: bpy.types.Object, context: bpy.types.Context) -> None:
         drive(update_steps(obj, context))
         return
     pattern = reshaped(read_pattern(obj, source.base.mesh), source.region, recipe, source.surroundings)
-    quality = Quality(settings.six, 0.0, 0.0, settings.gap_min, 0.0)
-    laid = measured(pattern, source.region, quality)
+    laid = measured(pattern, source.region, recipe, noted_quality(settings))
     write_sizes(obj, pattern)
     note(settings, source, recipe, laid)
 

@@ -14,8 +14,9 @@ from .limit_properties import LimitSettings
 from .packing_properties import PackingSettings
 from .reacting import redraw_preview, show_cut
 from .region_properties import RegionSettings
-from .result_properties import ResultSettings
+from .result_properties import BubblePatternBroken, ResultSettings
 from .shaping_properties import BubblePatternSeed, ShapingSettings
+from .solve_properties import SolveSettings
 
 # Raised when a property changes its meaning; see upgrade.
 SETTINGS_VERSION = 3
@@ -37,6 +38,7 @@ class BubblePatternSettings(
     ShapingSettings,
     FeatureSettings,
     LimitSettings,
+    SolveSettings,
     ResultSettings,
     bpy.types.PropertyGroup,
 ):
@@ -104,7 +106,7 @@ def pattern_of(obj: bpy.types.Object | None) -> bpy.types.Object | None:
     return on_base[0] if on_base else None
 
 
-CLASSES = (BubblePatternField, BubblePatternSeed, BubblePatternSettings)
+CLASSES = (BubblePatternField, BubblePatternSeed, BubblePatternBroken, BubblePatternSettings)
 _register, _unregister = bpy.utils.register_classes_factory(CLASSES)
 
 

@@ -52,7 +52,9 @@ def recipe_to_share(obj: bpy.types.Object, context: bpy.types.Context) -> str:
     spelled = (
         "units of Blender" if unit is None else unit if isinstance(unit, str) else f"units of {unit:g} mm"
     )
-    return LINE.format(unit=spelled) + recipe_to_toml(replace(recipe, output=Output(unit=unit)))
+    return LINE.format(unit=spelled) + recipe_to_toml(
+        replace(recipe, output=replace(recipe.output, unit=unit))
+    )
 
 
 def preset_text(obj: bpy.types.Object, context: bpy.types.Context) -> str:
@@ -101,6 +103,7 @@ def adopt_steps(
     Raises PatternError where the recipe is none or does not suit the region; then, or closed early, the
     settings are as they were.
     """
+    from ..core.solving import solving_steps
     from . import generation
     from .sources import read_source
 
@@ -109,6 +112,10 @@ def adopt_steps(
     source = read_source(settings.base, settings.region, context)
     recipe = _fitting(obj, context, tables, source.region, whole)
     check_number(recipe, source.region)
+    if recipe.solve:
+        source = read_source(settings.base, settings.region, context, recipe)
+        solved = yield from solving_steps(source.region, recipe, source.surroundings)
+        recipe = solved.recipe
     before = _present(settings)
     laid = False
     try:

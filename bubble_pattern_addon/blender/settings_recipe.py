@@ -11,12 +11,13 @@ import bpy
 from ..core.blending import Fill
 from ..core.errors import PatternError, RecipeError
 from ..core.metric import Constant, Described
-from ..core.recipe import Limits, Packing, Recipe, RegionChoice, Seed, Shaping
+from ..core.recipe import Packing, Recipe, RegionChoice, Seed, Shaping
 from ..core.recipe_checks import check_recipe
 from ..core.recipe_file import recipe_to_toml
 from .feature_settings import feature_of, placing, take_feature
 from .field_properties import point_of, typed
 from .field_recipe import described, take
+from .making_recipe import limits_of, output_of, shaping_output, sizes_of, take_limits, take_sizes
 from .properties import BubblePatternSettings
 
 
@@ -49,13 +50,11 @@ def recipe_of(settings: Any) -> Recipe:
             solver=settings.solver.lower(),
             tolerance=typed(settings.shaping_tolerance),
             iterations=settings.shaping_iterations,
+            sizes=sizes_of(settings),
         ),
         feature=feature_of(settings),
-        limits=Limits(
-            min_web=typed(settings.min_web),
-            min_margin=typed(settings.min_margin),
-            min_diameter=typed(settings.min_diameter),
-        ),
+        limits=limits_of(settings),
+        output=output_of(settings),
     )
     check_recipe(recipe)
     return recipe
@@ -76,9 +75,8 @@ def take_recipe(settings: Any, recipe: Recipe) -> None:
     take_packing(settings, recipe.packing)
     take_shaping(settings, recipe.shaping)
     take_feature(settings, recipe.feature)
-    settings.min_web = recipe.limits.min_web
-    settings.min_margin = recipe.limits.min_margin
-    settings.min_diameter = recipe.limits.min_diameter
+    take_limits(settings, recipe.limits)
+    settings.density = recipe.output.density or 0.0
     settings.live = live
 
 
@@ -139,6 +137,7 @@ def take_shaping(settings: Any, shaping: Shaping) -> None:
     settings.solver = shaping.solver.upper()
     settings.shaping_tolerance = shaping.tolerance
     settings.shaping_iterations = shaping.iterations
+    take_sizes(settings, shaping.sizes)
 
 
 def packing_text(recipe: Recipe) -> str:
@@ -148,7 +147,11 @@ def packing_text(recipe: Recipe) -> str:
 
 def recipe_text(recipe: Recipe) -> str:
     """What the pattern's points depend on, as text; how the features are cut is left out."""
-    return recipe_to_toml(replace(recipe, feature=placing(recipe.feature)))
+    # the rules of a process depend on how deep a feature is
+    feature = placing(recipe.feature)
+    if recipe.limits.process is not None:
+        feature = replace(feature, depth=recipe.feature.depth)
+    return recipe_to_toml(replace(recipe, feature=feature, output=shaping_output(recipe)))
 
 
 def is_outdated(settings: Any) -> bool:

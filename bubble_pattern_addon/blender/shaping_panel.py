@@ -20,6 +20,9 @@ class BUBBLE_PATTERN_PT_shaping(SettingsPanel, bpy.types.Panel):
         share = settings.diameter_mode == 'SHARE'
         draw_field(column, settings, "fill" if share else "diameter", "diameter_field", share, "Diameter")
         column.row().prop(settings, "diameter_mode", text=" ", expand=True)
+        column.prop(settings, "sizes")
+        if settings.sizes == 'LIST':
+            column.prop(settings, "size_list", text=" ")
         row = column.row(align=True)
         if context.mode == 'OBJECT':
             row.operator("bubble_pattern.edit_sizes", icon='PINNED')

@@ -11,6 +11,7 @@ from bpy.props import (
     FloatVectorProperty,
     IntProperty,
     PointerProperty,
+    StringProperty,
 )
 
 from ..core.recipe import FILL, Shaping
@@ -90,5 +91,27 @@ class ShapingSettings:
         description="Most times that sizes are averaged",
         default=Shaping().iterations,
         min=1,
+        update=reshape,
+    )
+    sizes: EnumProperty(
+        name="Sizes",
+        description="Which diameters there are: every feature gets the nearest smaller one",
+        items=(
+            ('ANY', "Any", "Every diameter"),
+            ('DRILLS_01', "Drills by 0.1 mm", "Twist drills in steps of 0.1 mm, from 0.2 to 14 mm"),
+            ('DRILLS_05', "Drills by 0.5 mm", "Twist drills in steps of 0.5 mm, from 0.5 to 25 mm"),
+            ('DRILLS_1', "Drills by 1 mm", "Twist drills in steps of 1 mm, from 1 to 50 mm"),
+            ('TAP_DRILLS', "Tap Drills", "Holes for metric coarse threads, M1 to M24, after ISO 2306"),
+            ('R10', "R10", "Ten preferred numbers to a decade, after ISO 3, in millimeters"),
+            ('R20', "R20", "Twenty preferred numbers to a decade, after ISO 3, in millimeters"),
+            ('LIST', "List", "Those of a list"),
+        ),
+        default='ANY',
+        update=reshape,
+    )
+    size_list: StringProperty(
+        name="Size List",
+        description="Diameters, separated by commas, in the unit of the scene or with another unit behind",
+        default="",
         update=reshape,
     )

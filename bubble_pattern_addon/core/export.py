@@ -15,8 +15,11 @@ from .isometries import OFF
 from .mesh import Floats, Ints
 from .pattern import Pattern, aimed
 from .quality import Quality, measure, min_margin, min_web, open_area
+from .recipe import Recipe
 from .region import Region
+from .results_report import results_report
 from .solid import Part
+from .solving import Solved
 
 COLUMNS = ("id", "x", "y", "z", "nx", "ny", "nz", "diameter", "pitch", "row")
 PARTNER = "partner"
@@ -71,14 +74,22 @@ def _partner_column(partners: Ints) -> list[list[str]]:
     return [[" ".join(map(str, ids[1:]))] for ids in partners.tolist()]
 
 
-def make_report(region: Region, pattern: Pattern, part: Part, seconds: Mapping[str, float]) -> dict[str, Any]:
+def make_report(
+    region: Region,
+    pattern: Pattern,
+    part: Part,
+    seconds: Mapping[str, float],
+    recipe: Recipe | None = None,
+    solved: Solved | None = None,
+) -> dict[str, Any]:
     """The figures of a run in the unit of the base, ready for JSON; one with nothing to measure is None.
 
     kind (of the features), features, watertight, genus, volume, open_area, min_web, min_margin, quality{six,
     psi6, gap_cv, gap_min, rim_cv} and seconds{region, pack, shape, add}; further symmetry, the recipe's word
     for the one that the pattern has, or "off", wall{min, max}, the near wall's thickness at the features,
     limits (see limits_report), undercut and undercut_ids, features that cannot be drawn off along the pull,
-    problems, one sentence each, empty when the part is good, and notes, likewise, on what does no harm.
+    problems, one sentence each, empty when the part is good, and notes, likewise, on what does no harm; with
+    the recipe, what results_report adds.
     """
     figures: Quality = measure(pattern, region)
     thickness = part.thickness[np.isfinite(part.thickness)]
@@ -114,6 +125,8 @@ def make_report(region: Region, pattern: Pattern, part: Part, seconds: Mapping[s
         "problems": list(part.check.problems),
         "notes": [*part.check.notes, *pattern.notes],
     }
+    if recipe is not None:
+        report |= results_report(pattern, region, part, recipe, figures, solved)
     cleaned = _without_nonsense(report)
     assert isinstance(cleaned, dict)
     return cleaned
@@ -140,6 +153,8 @@ def _without_nonsense(value: Any) -> Any:
     """JSON knows neither nan nor inf: they become None."""
     if isinstance(value, dict):
         return {key: _without_nonsense(entry) for key, entry in value.items()}
+    if isinstance(value, list):
+        return [_without_nonsense(entry) for entry in value]
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value

@@ -56,6 +56,13 @@ def feature_sizes(feature: Feature, pattern: Pattern) -> FeatureSizes:
     )
 
 
+def depths(feature: Feature, pattern: Pattern) -> Floats:
+    """How deep the features go below the surface, (n,): nan for holes through the wall, 0 for bumps."""
+    if feature.kind == "bump":
+        return np.zeros(len(pattern))
+    return feature_sizes(feature, pattern).depth
+
+
 def _size(feature: Feature, pattern: Pattern, key: str, default: float | Floats) -> Floats:
     size = getattr(feature, key)
     if isinstance(size, Described):

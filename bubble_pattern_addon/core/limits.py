@@ -15,38 +15,43 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from .distance import boundary_distance
+from .floors import Floors, floors_of
 from .mesh import Bools, Floats, Ints
+from .nominal import SAME, next_above, snapped
 from .packing.crowding import uncrowded
 from .pattern import Pattern, split
-from .quality import SHEET_TURN, same_sheet
 from .recipe import Limits
 from .region import Region
+from .webs import LEAST_WEB, ROUNDING, narrow_pairs
 
-# Features that touched would make a part that is no solid: this share of the pitch remains between two of
-# them, and half as much to the boundary, where the limits ask for less.
-LEAST_WEB = 0.02
-# Normals that agree this well are of one face or of faces one above the other, not on both sides of an edge.
-LEVEL = 0.7
 # Partners of a symmetric pattern whose wished diameters differ by no larger share ask for the same.
 SAME_WISH = 1e-6
-# Webs come out wider than asked by this, so that rounding takes nothing off them.
-ROUNDING = 1e-12
 
 
 def limited(bubbles: Pattern, region: Region, limits: Limits) -> Pattern:
-    """The pattern with its diameters cut down to the limits, its too small features left out.
+    """The pattern within its limits alone; see limited_by."""
+    return limited_by(bubbles, region, floors_of(bubbles, region, limits))
+
+
+def limited_by(bubbles: Pattern, region: Region, floors: Floors, sizes: Floats | None = None) -> Pattern:
+    """The pattern with its diameters cut down to the floors, its too small features left out.
 
     bubbles: with the diameters that the shaping metric asks for, which stay in `wished`
+    sizes: (k,) rising, the only diameters there are: every feature gets the nearest smaller one, and one that
+    would have to be smaller than all that its floors allow is left out
     """
     wished = bubbles.diameter
-    diameter, kept = within_limits(bubbles, region, limits)
+    if sizes is not None:
+        floors = replace(floors, hole=next_above(floors.diameter, sizes))
+    diameter, kept = within_floors(bubbles, region, floors)
     if bubbles.partners is not None:
         order = np.argsort(bubbles.ids)
         partners = order[np.searchsorted(bubbles.ids, bubbles.partners, sorter=order)]
         diameter, kept = _alike(partners, wished, diameter, kept)
+    if sizes is not None:
+        diameter = snapped(diameter, sizes)
     return split(replace(bubbles, diameter=np.where(kept, diameter, 0.0), wished=wished), kept)
 
 
@@ -62,15 +67,20 @@ def _alike(partners: Ints, wished: Floats, diameter: Floats, kept: Bools) -> tup
 
 
 def within_limits(bubbles: Pattern, region: Region, limits: Limits) -> tuple[Floats, Bools]:
+    """See within_floors."""
+    return within_floors(bubbles, region, floors_of(bubbles, region, limits))
+
+
+def within_floors(bubbles: Pattern, region: Region, floors: Floors) -> tuple[Floats, Bools]:
     """The largest diameters (n,) that the rule above allows, and which features are kept, (n,)."""
-    margin = np.maximum(limits.min_margin, LEAST_WEB / 2 * bubbles.pitch)
+    margin = np.maximum(floors.margin, LEAST_WEB / 2 * bubbles.pitch)
     # whoever is farther from the boundary than this keeps every margin
     clear = 1.01 * float((bubbles.diameter / 2 + margin).max(initial=0.0))
     edge = boundary_distance(bubbles.position, region.boundary_segments, clear)
     most = np.minimum(bubbles.diameter, 2 * (edge - margin) * (1 - ROUNDING))
-    smallest = max(limits.min_diameter, 0.0)
+    smallest = floors.diameter * (1 - SAME)
     kept = (most >= smallest) & (most > 0)
-    pairs, room = narrow_pairs(bubbles, region, most, kept, limits.min_web)
+    pairs, room = narrow_pairs(bubbles, region, most, kept, floors.web)
     while True:
         diameter = most * _factors(pairs, room, most)
         small = kept & ((diameter < smallest) | (diameter <= 0))
@@ -79,54 +89,6 @@ def within_limits(bubbles: Pattern, region: Region, limits: Limits) -> tuple[Flo
         kept &= ~_giving_way(pairs[small[pairs].all(axis=1)], small, most)
         both = kept[pairs].all(axis=1)
         pairs, room = pairs[both], room[both]
-
-
-def narrow_pairs(
-    bubbles: Pattern, region: Region, diameter: Floats, kept: Bools, min_web: float
-) -> tuple[Ints, Floats]:
-    """Pairs (m, 2) of `kept` (n,) features that leave less than the least web, and their room, (m,): the most
-    that the mean of their two diameters may be.
-
-    Features on both sides of a thin wall are none, nor those of faces one above the other.
-    """
-    position, pitch = bubbles.position, bubbles.pitch
-    size = diameter + np.maximum(min_web, LEAST_WEB * pitch)
-    pairs = _within_reach(position, size, np.flatnonzero(kept))
-    offset = position[pairs[:, 1]] - position[pairs[:, 0]]
-    distance = np.linalg.norm(offset, axis=1)
-    least = np.maximum(min_web, LEAST_WEB * pitch[pairs].mean(axis=1))
-    room = (distance - least) * (1 - ROUNDING)
-    narrow = diameter[pairs].mean(axis=1) > room
-    narrow &= region.single_sheet | _feel_each_other(bubbles.normal, pairs, offset, distance)
-    return pairs[narrow], room[narrow]
-
-
-def _within_reach(position: Floats, size: Floats, rows: Ints) -> Ints:
-    """Pairs (m, 2) of the `rows` nearer than the larger of their two sizes, among a few others.
-
-    Octave by octave of the sizes, so that large ones among small do not list thousands.
-    """
-    octave = np.floor(np.log2(size[rows]))
-    found = [np.empty((0, 2), dtype=np.int64)]
-    for one in np.unique(octave):
-        own, other = rows[octave == one], rows[octave <= one]
-        near = cKDTree(position[own]).sparse_distance_matrix(
-            cKDTree(position[other]), float(size[own].max()), output_type="ndarray"
-        )
-        pairs = np.stack([own[near["i"]], other[near["j"]]], axis=1)
-        # two of the same octave find each other twice
-        found.append(pairs[(size[pairs[:, 1]] < 2.0**one) | (pairs[:, 0] < pairs[:, 1])])
-    return np.concatenate(found)
-
-
-def _feel_each_other(normal: Floats, pairs: Ints, offset: Floats, distance: Floats) -> Bools:
-    """Whether two features, (m,), share the material between them: on one sheet or on both sides of an
-    edge.
-    """
-    one, other = normal[pairs[:, 0]], normal[pairs[:, 1]]
-    cosine = np.einsum("mc,mc->m", one, other)
-    level = same_sheet(offset[:, None], one[:, None], other[:, None], distance[:, None])[:, 0]
-    return np.where(cosine > LEVEL, level, cosine > SHEET_TURN)
 
 
 def _factors(pairs: Ints, room: Floats, diameter: Floats) -> Floats:

@@ -14,8 +14,9 @@ from dataclasses import dataclass, field
 from .feature_recipe import Feature as Feature
 from .isometries import OFF
 from .metric import Constant, Described
+from .nominal import Sizes
 from .toml_values import Point
-from .units import Unit
+from .units import Unit, millimetres_in
 
 INTEGRATORS = ("fire", "rk4")
 ORIENTATIONS = ("edge", "best")
@@ -84,6 +85,8 @@ class Shaping:
     diameter: the shaping metric, a size; as a share of the local pitch it is a Fill, in TOML the key fill
     seeds: where there are any, only these features have a size of their own, and every other one that they
     reach takes the average of its neighbours (see core.averaging)
+    sizes: the only diameters there are, each feature gets the nearest smaller one: a list of them or the name
+    of a series (see core.nominal); None for any
     solver: of the averages: "direct", or "iterate" as the paper does, until no diameter changes by more than
     the share `tolerance` of it, at most `iterations` times
     """
@@ -93,6 +96,7 @@ class Shaping:
     solver: str = "direct"
     tolerance: float = 1e-6
     iterations: int = 10_000
+    sizes: Sizes | None = None
 
 
 @dataclass(frozen=True)
@@ -101,11 +105,31 @@ class Limits:
 
     min_web: material between two features; min_margin: from a feature's edge to the region's boundary;
     min_diameter: a feature that would have to be smaller is left out
+    process: whose rules hold too, one of PROCESSES (see core.processes); thickness: of the wall that they go
+    by, None for the near wall as it is measured under each feature; check_only: they shape nothing, and it is
+    only told who breaks them
     """
 
     min_web: float = 0.0
     min_margin: float = 0.0
     min_diameter: float = 0.0
+    process: str | None = None
+    thickness: float | None = None
+    check_only: bool = False
+
+
+@dataclass(frozen=True)
+class Solve:
+    """What a pattern shall come to, either open_area (a share of the region's) or count (of features), by
+    changing the "pitch" or the "diameter" (see core.solving). Nothing given: the recipe is taken as it is.
+    """
+
+    open_area: float | None = None
+    count: int | None = None
+    by: str | None = None
+
+    def __bool__(self) -> bool:
+        return self.open_area is not None or self.count is not None
 
 
 @dataclass(frozen=True)
@@ -116,6 +140,7 @@ class Output:
     pattern.blend; picture: a rendered view of the part as part.png
     drawings: of the pattern, in these formats (see DRAWINGS), as pattern.dxf and so on; projection, align:
     how it is drawn, see drawing.make_drawing
+    density: of the part's material in g/cm3, for the mass of what is removed
     unit: that of the recipe's lengths (see core.units), and of the base where its file does not say; None:
     that of the base, or millimetres
     """
@@ -126,6 +151,7 @@ class Output:
     drawings: tuple[str, ...] = ()
     projection: str | Point = "flat"
     align: str = "base"
+    density: float | None = None
     unit: Unit | None = None
 
 
@@ -138,7 +164,13 @@ class Recipe:
     shaping: Shaping = field(default_factory=Shaping)
     feature: Feature = field(default_factory=Feature)
     limits: Limits = field(default_factory=Limits)
+    solve: Solve = field(default_factory=Solve)
     output: Output = field(default_factory=Output)
+
+    @property
+    def millimetre(self) -> float:
+        """Length of a millimetre in the unit of the base: what drills and the rules of processes go by."""
+        return 1.0 / millimetres_in(self.output.unit or "mm")
 
 
 def neat(length: float) -> float:

@@ -10,6 +10,8 @@ from .feature_checks import check_feature
 from .field_tables import asks_for_pitch
 from .isometries import check_symmetry
 from .metric import Constant, Described
+from .nominal import check_sizes
+from .processes import PROCESSES
 from .recipe import (
     ALIGNMENTS,
     DRAWINGS,
@@ -18,12 +20,16 @@ from .recipe import (
     ORIENTATIONS,
     PROJECTIONS,
     SOLVERS,
+    Limits,
     Output,
     Recipe,
     RegionChoice,
     Shaping,
 )
 from .toml_values import check_above, check_at_least, check_finite, check_one_of
+
+# Share of the plane that a hexagonal arrangement of touching circles covers: pi / (2 sqrt 3).
+DENSEST = math.pi / (2 * math.sqrt(3))
 
 
 def check_choice(choice: RegionChoice) -> None:
@@ -65,23 +71,10 @@ def check_recipe(recipe: Recipe) -> None:
     for coordinate in packing.symmetry_centre or ():
         check_finite(coordinate, "[packing] symmetry_centre")
     check_feature(recipe.feature, uniform_diameter(recipe))
-    check_at_least(limits.min_web, 0, "[limits] min_web")
-    check_at_least(limits.min_margin, 0, "[limits] min_margin")
-    check_at_least(limits.min_diameter, 0, "[limits] min_diameter")
+    _check_limits(limits)
+    _check_solve(recipe)
     _check_output(recipe.output)
     _check_room(recipe)
-
-
-def _check_output(output: Output) -> None:
-    for name in output.formats:
-        check_one_of(name, FORMATS, "[output] formats")
-    for name in output.drawings:
-        check_one_of(name, DRAWINGS, "[output] drawings")
-    if isinstance(output.projection, str):
-        check_one_of(output.projection, PROJECTIONS, "[output] projection")
-    elif not any(output.projection):
-        raise RecipeError("[output] projection = [0, 0, 0] is no direction: give one towards the viewer")
-    check_one_of(output.align, ALIGNMENTS, "[output] align")
 
 
 def _check_length(described: Described, where: str) -> None:
@@ -112,6 +105,61 @@ def _check_shaping(shaping: Shaping) -> None:
     check_one_of(shaping.solver, SOLVERS, "[shaping] solver")
     check_above(shaping.tolerance, "[shaping] tolerance")
     check_at_least(shaping.iterations, 1, "[shaping] iterations")
+    if shaping.sizes is not None:
+        check_sizes(shaping.sizes, "[shaping] sizes")
+
+
+def _check_limits(limits: Limits) -> None:
+    check_at_least(limits.min_web, 0, "[limits] min_web")
+    check_at_least(limits.min_margin, 0, "[limits] min_margin")
+    check_at_least(limits.min_diameter, 0, "[limits] min_diameter")
+    if limits.process is not None:
+        check_one_of(limits.process, tuple(PROCESSES), "[limits] process")
+    if limits.thickness is not None:
+        check_above(limits.thickness, "[limits] thickness")
+
+
+def _check_output(output: Output) -> None:
+    if output.density is not None:
+        check_above(output.density, "[output] density")
+    for name in output.formats:
+        check_one_of(name, FORMATS, "[output] formats")
+    for name in output.drawings:
+        check_one_of(name, DRAWINGS, "[output] drawings")
+    if isinstance(output.projection, str):
+        check_one_of(output.projection, PROJECTIONS, "[output] projection")
+    elif not any(output.projection):
+        raise RecipeError("[output] projection = [0, 0, 0] is no direction: give one towards the viewer")
+    check_one_of(output.align, ALIGNMENTS, "[output] align")
+
+
+def _check_solve(recipe: Recipe) -> None:
+    """RecipeError for a target that is none, or that cannot be reached the way that is asked for."""
+    solve = recipe.solve
+    if not solve:
+        if solve.by is not None:
+            raise RecipeError("[solve] has no target: give open_area or count, or leave the table out")
+        return
+    if solve.open_area is not None and solve.count is not None:
+        raise RecipeError("[solve] gives both open_area and count: keep one of them")
+    if solve.by is not None:
+        check_one_of(solve.by, ("diameter", "pitch"), "[solve] by")
+    if solve.count is not None:
+        check_at_least(solve.count, 1, "[solve] count")
+        if solve.by == "diameter":
+            raise RecipeError(
+                '[solve] count does not hang on the diameter: solve by = "pitch", or leave by out'
+            )
+    elif solve.open_area is not None and not 0 < solve.open_area < DENSEST:
+        raise RecipeError(
+            f"[solve] open_area = {solve.open_area:g} must be a share above 0 and below {DENSEST:.4g}, which "
+            "touching circles take"
+        )
+    if solve.open_area is not None and solve.by == "pitch" and isinstance(recipe.shaping.diameter, Fill):
+        raise RecipeError(
+            "[shaping] fill lets the diameter follow the pitch, so that the open area hangs on fill alone: "
+            'solve by = "diameter", or give a diameter'
+        )
 
 
 def uniform_diameter(recipe: Recipe) -> float | None:

@@ -13,6 +13,7 @@ from .errors import RecipeError
 from .feature_recipe import READERS as FEATURE_READERS
 from .field_tables import field_from_toml, field_to_toml
 from .metric import Constant, Described
+from .nominal import sizes_from_toml
 from .recipe import FILL, Recipe, Seed, rounded
 from .recipe_checks import check_choice, check_recipe
 from .toml_values import Point, flag, nearest, number, point, show, spell, text, texts, whole
@@ -73,7 +74,11 @@ def recipe_from_dict(data: Mapping[str, Any], defaults: Recipe | None = None) ->
 
 def _proportioned(recipe: Recipe, has_pitch: bool, shaping: Mapping[str, Any]) -> Recipe:
     pitch, diameter = recipe.packing.pitch, recipe.shaping.diameter
-    if has_pitch and not {"diameter", "fill"} & set(shaping):
+    sized = {"diameter", "fill"} & set(shaping)
+    if recipe.solve.count is not None and not sized:
+        # the pitch will be another one
+        return replace(recipe, shaping=replace(recipe.shaping, diameter=Fill(Constant(FILL))))
+    if has_pitch and not sized:
         size = Constant(rounded(FILL * pitch.value)) if isinstance(pitch, Constant) else Fill(Constant(FILL))
         return replace(recipe, shaping=replace(recipe.shaping, diameter=size))
     if "diameter" in shaping and not has_pitch and isinstance(diameter, Constant):
@@ -158,9 +163,15 @@ READERS: dict[str, dict[str, Callable[[object, str], Any]]] = {
         "solver": text,
         "tolerance": number,
         "iterations": whole,
+        "sizes": sizes_from_toml,
     },
     "feature": FEATURE_READERS,
-    "limits": {"min_web": number, "min_margin": number, "min_diameter": number},
+    "limits": {
+        **dict.fromkeys(("min_web", "min_margin", "min_diameter", "thickness"), number),
+        "process": text,
+        "check_only": flag,
+    },
+    "solve": {"open_area": number, "count": whole, "by": text},
     "output": {
         "blend": flag,
         "picture": flag,
@@ -168,6 +179,7 @@ READERS: dict[str, dict[str, Callable[[object, str], Any]]] = {
         "drawings": texts,
         "projection": _word_or_vector,
         "align": text,
+        "density": number,
         "unit": read_unit,
     },
 }
@@ -181,6 +193,8 @@ def recipe_to_toml(recipe: Recipe) -> str:
     lines: list[str] = []
     for section in fields(recipe):
         table = getattr(recipe, section.name)
+        if section.name == "solve" and not table:
+            continue
         lines += [f"[{section.name}]"]
         lines += [
             _line(entry.name, getattr(table, entry.name))

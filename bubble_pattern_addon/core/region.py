@@ -10,6 +10,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from .boxtree import BoxTree, build_tree
 from .errors import RegionError
 from .mesh import Bools, Floats, Ints, Mesh
 
@@ -113,6 +114,11 @@ class Region:
         row, corner = self.rim.T
         ends = np.stack([(corner + 1) % 3, (corner + 2) % 3], axis=1)
         return self.corners[row[:, None], ends]
+
+    @cached_property
+    def tree(self) -> BoxTree:
+        """Boxes round the triangles of the whole base."""
+        return build_tree(self.base.columns)
 
     @cached_property
     def perimeter(self) -> float:

@@ -8,15 +8,19 @@ import numpy as np
 
 from .averaging import averaged
 from .errors import FieldError, RecipeError
+from .feature_sizes import depths
+from .floors import Floors, floors_of
 from .heading import headed
-from .limits import limited
+from .limits import limited_by
 from .links import Links, links_of
 from .mesh import Floats
 from .metric import Described, Field
+from .nominal import nominal_sizes
 from .pattern import Pattern, all_bubbles
 from .recipe import Recipe, Shaping
 from .region import Region
 from .surroundings import Surroundings
+from .toml_values import show
 
 
 def bound(described: Described, surroundings: Surroundings, where: str) -> Field:
@@ -41,10 +45,16 @@ def shaped(
     surroundings = replace(surroundings, region=region)
     wished, notes = diameters(recipe.shaping, bubbles, links, surroundings)
     bubbles = headed(bubbles, links, recipe.feature, surroundings)
-    pattern = limited(
-        replace(bubbles, diameter=wished, notes=(*bubbles.packing_notes, *notes)), region, recipe.limits
+    mm = recipe.millimetre
+    floors = floors_of(bubbles, region, recipe.limits, depths(recipe.feature, bubbles), mm)
+    pattern = limited_by(
+        replace(bubbles, diameter=wished, notes=(*bubbles.packing_notes, *notes, *floors.notes)),
+        region,
+        floors,
+        nominal_sizes(recipe.shaping.sizes, mm),
     )
     if len(bubbles) and not len(pattern):
+        refuse_process(recipe, floors, wished)
         raise RecipeError(
             "No feature is left: diameters up to {widest} do not go with [limits] min_web = {web}, "
             "min_margin = {margin} and min_diameter = {least}; make one of these smaller or the pitch larger",
@@ -54,6 +64,26 @@ def shaped(
             least=recipe.limits.min_diameter,
         )
     return pattern
+
+
+def refuse_process(recipe: Recipe, floors: Floors, wished: Floats) -> None:
+    """RecipeError where it is the process or the nominal sizes that leave no feature."""
+    if recipe.shaping.sizes is not None:
+        raise RecipeError(
+            "No feature is left: none of [shaping] sizes is within the limits and not above the diameters, "
+            "which go up to {widest}; add smaller sizes or make the diameter larger",
+            widest=float(wished.max()),
+        )
+    if recipe.limits.process is not None:
+        raise RecipeError(
+            f'No feature is left: {show(recipe.limits.process)} asks for diameters from {{hole}}, webs from '
+            "{web} and margins from {margin}, and the diameters go up to {widest}; make pitch and diameter "
+            "larger, or choose another process",
+            hole=float(floors.diameter.min()),
+            web=float(floors.web.min()),
+            margin=float(floors.margin.min()),
+            widest=float(wished.max()),
+        )
 
 
 def reshaped(pattern: Pattern, region: Region, recipe: Recipe, surroundings: Surroundings) -> Pattern:

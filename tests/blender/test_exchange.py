@@ -349,3 +349,19 @@ def test_an_empty_clipboard_is_told() -> None:
     recipe_operators._held.clear()
     with pytest.raises(RecipeError, match="copy a recipe first"):
         recipe_operators.from_clipboard(bpy.context)
+
+
+def test_a_target_in_a_recipe_is_met() -> None:
+    pattern = a_pattern()
+    recipe_operators._held[:] = ["[solve]\ncount = 300"]
+    assert OPS.recipe_paste() == {'FINISHED'}
+    assert abs(pattern.bubble_pattern.count - 300) <= 2
+
+
+def test_the_rules_of_a_process_go_along() -> None:
+    pattern = a_pattern()
+    pattern.bubble_pattern.process = 'LASER'
+    pattern.bubble_pattern.density = 2.7
+    tables = tomllib.loads(copied())
+    assert tables["limits"]["process"] == "laser"
+    assert tables["output"] == tables["output"] | {"density": 2.7, "unit": "m"}

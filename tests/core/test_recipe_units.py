@@ -31,7 +31,8 @@ PURE = {
         *("draft", "rim_angle", "aspect", "rounding", "points", "axis", "pull", "turn_direction", "angle"),
     },
     "limits": set(),
-    "output": {"projection", "unit"},
+    "solve": {"open_area"},
+    "output": {"projection", "density", "unit"},
 }
 NUMBERS = ("float", "Point", "Described", "Size", "Seed", "KeepOut")
 
