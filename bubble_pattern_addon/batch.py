@@ -137,8 +137,7 @@ def run_steps(base: LoadedBase, recipe_file: Path) -> Steps[Run]:
     drawing = draw(region, pattern, recipe, millimetres) if recipe.output.drawings else None
     part = yield from within(part_steps(base.mesh, pattern, recipe.feature, stamp), 0.5, 1.0)
     clock.stop("add")
-    report = make_report(region, pattern, part, clock.seconds, recipe, solved)
-    report |= drawing_report(drawing)
+    report = make_report(region, pattern, part, clock.seconds, recipe, solved) | drawing_report(drawing)
     if part.check.problems:
         raise BaseError(f"The part is not good: {' '.join(part.check.problems)}")
     origin = recipe_file.parent

@@ -22,6 +22,7 @@ from ..core.recipe_units import fitted_recipe, recipe_in
 from ..core.units import unit_of
 from .reading import world_frame
 from .settings_recipe import recipe_of, take_recipe
+from .solving import target_steps
 from .units import scene_millimetres
 
 # A recipe that would lay more features than this is taken for one in another unit.
@@ -103,7 +104,6 @@ def adopt_steps(
     Raises PatternError where the recipe is none or does not suit the region; then, or closed early, the
     settings are as they were.
     """
-    from ..core.solving import solving_steps
     from . import generation
     from .sources import read_source
 
@@ -112,15 +112,14 @@ def adopt_steps(
     source = read_source(settings.base, settings.region, context)
     recipe = _fitting(obj, context, tables, source.region, whole)
     check_number(recipe, source.region)
-    if recipe.solve:
-        source = read_source(settings.base, settings.region, context, recipe)
-        solved = yield from solving_steps(source.region, recipe, source.surroundings)
-        recipe = solved.recipe
     before = _present(settings)
     laid = False
     try:
         take_recipe(obj.bubble_pattern, recipe)
-        yield from generation.update_steps(obj, context)
+        if recipe.solve:
+            yield from target_steps(obj, context, replace(recipe_of(obj.bubble_pattern), solve=recipe.solve))
+        else:
+            yield from generation.update_steps(obj, context)
         laid = True
     finally:
         if not laid and before is not None:

@@ -138,9 +138,9 @@ class Output:
 
     formats: the part in these formats too (see FORMATS); blend: the base with the editable pattern as
     pattern.blend; picture: a rendered view of the part as part.png
+    density: of the part's material in g/cm3, for the mass of what is removed
     drawings: of the pattern, in these formats (see DRAWINGS), as pattern.dxf and so on; projection, align:
     how it is drawn, see drawing.make_drawing
-    density: of the part's material in g/cm3, for the mass of what is removed
     unit: that of the recipe's lengths (see core.units), and of the base where its file does not say; None:
     that of the base, or millimetres
     """
@@ -148,10 +148,10 @@ class Output:
     blend: bool = False
     picture: bool = False
     formats: tuple[str, ...] = ()
+    density: float | None = None
     drawings: tuple[str, ...] = ()
     projection: str | Point = "flat"
     align: str = "base"
-    density: float | None = None
     unit: Unit | None = None
 
 

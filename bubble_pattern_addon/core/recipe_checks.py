@@ -77,6 +77,20 @@ def check_recipe(recipe: Recipe) -> None:
     _check_room(recipe)
 
 
+def _check_output(output: Output) -> None:
+    if output.density is not None:
+        check_above(output.density, "[output] density")
+    for name in output.formats:
+        check_one_of(name, FORMATS, "[output] formats")
+    for name in output.drawings:
+        check_one_of(name, DRAWINGS, "[output] drawings")
+    if isinstance(output.projection, str):
+        check_one_of(output.projection, PROJECTIONS, "[output] projection")
+    elif not any(output.projection):
+        raise RecipeError("[output] projection = [0, 0, 0] is no direction: give one towards the viewer")
+    check_one_of(output.align, ALIGNMENTS, "[output] align")
+
+
 def _check_length(described: Described, where: str) -> None:
     """RecipeError for a field that makes no sense or can become 0 or less; one without bounds is judged in
     place.
@@ -117,20 +131,6 @@ def _check_limits(limits: Limits) -> None:
         check_one_of(limits.process, tuple(PROCESSES), "[limits] process")
     if limits.thickness is not None:
         check_above(limits.thickness, "[limits] thickness")
-
-
-def _check_output(output: Output) -> None:
-    if output.density is not None:
-        check_above(output.density, "[output] density")
-    for name in output.formats:
-        check_one_of(name, FORMATS, "[output] formats")
-    for name in output.drawings:
-        check_one_of(name, DRAWINGS, "[output] drawings")
-    if isinstance(output.projection, str):
-        check_one_of(output.projection, PROJECTIONS, "[output] projection")
-    elif not any(output.projection):
-        raise RecipeError("[output] projection = [0, 0, 0] is no direction: give one towards the viewer")
-    check_one_of(output.align, ALIGNMENTS, "[output] align")
 
 
 def _check_solve(recipe: Recipe) -> None:

@@ -176,10 +176,10 @@ READERS: dict[str, dict[str, Callable[[object, str], Any]]] = {
         "blend": flag,
         "picture": flag,
         "formats": texts,
+        "density": number,
         "drawings": texts,
         "projection": _word_or_vector,
         "align": text,
-        "density": number,
         "unit": read_unit,
     },
 }
