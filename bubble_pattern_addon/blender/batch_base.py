@@ -6,7 +6,7 @@ writes.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,16 +17,17 @@ import numpy as np
 
 from ..core.errors import BaseError, OutputError
 from ..core.field_tables import NO_NAMES, Wanted
-from ..core.files import LoadedBase
+from ..core.files import LoadedBase, load_solids
 from ..core.mesh import Bools, Floats, Mesh
 from ..core.moving import moved_pattern, moved_recipe
 from ..core.quality import measure
-from ..core.recipe import Recipe
+from ..core.recipe import KeepOut, Recipe
 from ..core.recipe_names import recipe_names, with_recipe_images
 from .applying import place_part, verdict_of
 from .attributes import CORNER_VERTEX, MATERIAL, write_values
 from .feature_objects import read_stamp as read_object_stamp
 from .generation import fill_settings, measured, put
+from .keep_outs import read_solids
 from .marked_side import on_marked_side
 from .part_mesh import build_part_mesh
 from .pattern_object import new_pattern_object
@@ -76,9 +77,9 @@ def registered() -> Iterator[None]:
 # -- in ------------------------------------------------------------------------------------------------------
 
 
-def read_base(path: Path | None, names: Wanted = NO_NAMES) -> LoadedBase:
+def read_base(path: Path | None, names: Wanted = NO_NAMES, keep_outs: Sequence[KeepOut] = ()) -> LoadedBase:
     """The base in a .blend file, with its modifiers and in world coordinates, and of what is painted on it or
-    stands beside it what `names` asks for; None: in the file that is open.
+    stands beside it what `names` and `keep_outs` ask for; None: in the file that is open.
 
     Raises BaseError where the file is no .blend, or which of its objects is meant cannot be told.
     """
@@ -94,6 +95,7 @@ def read_base(path: Path | None, names: Wanted = NO_NAMES) -> LoadedBase:
             base = read_object(obj, mesh, WORLD)
             painted = read_painted(obj, mesh, base, replace(names, images=frozenset()))
         around = with_things(painted, names, WORLD, bpy.context)
+        solids = read_solids([entry for entry in keep_outs if entry.file is None], WORLD, bpy.context)
         marks = {name: on_marked_side(obj, base, name, mask) for name, mask in base.attributes.items()}
     return BlendBase(
         base.mesh,
@@ -103,6 +105,7 @@ def read_base(path: Path | None, names: Wanted = NO_NAMES) -> LoadedBase:
         values=around.attributes,
         uv_maps=around.uv_maps,
         objects=around.objects,
+        solids=solids,
         millimetres=scene_millimetres(bpy.context.scene),
     )
 
@@ -147,7 +150,7 @@ def write_blend(path: Path, run: Run) -> None:
             mark(base_obj, region, base, run.selected)
         pattern_obj = new_pattern_object(base_obj)
         to_frame = np.linalg.inv(world_frame(base_obj))
-        fill_settings(pattern_obj, base_obj, region, moved_recipe(with_images_in(run), to_frame, run.region))
+        fill_settings(pattern_obj, base_obj, region, moved_recipe(with_files_in(run), to_frame, run.region))
         recipe = recipe_of(pattern_obj.bubble_pattern)
         source = read_source(base_obj, region, bpy.context, recipe)
         own = moved_pattern(run.pattern, to_frame)
@@ -162,8 +165,10 @@ def write_blend(path: Path, run: Run) -> None:
             raise OutputError(f"{path.name} can't be written: {str(error).removeprefix('Error: ')}") from None
 
 
-def with_images_in(run: Run) -> Recipe:
-    """The recipe with the image files that it names taken into the open file, under names that fit there."""
+def with_files_in(run: Run) -> Recipe:
+    """The recipe with the image and mesh files that it names taken into the open file, under names that fit
+    there.
+    """
     names: dict[str, str] = {}
     for name in sorted(recipe_names(run.recipe).images):
         if (run.origin / name).is_file():
@@ -172,7 +177,22 @@ def with_images_in(run: Run) -> Recipe:
             image.pack()
             image.use_fake_user = True  # a field that is kept as text does not hold it
             names[name] = image.name
-    return with_recipe_images(run.recipe, names)
+    recipe = with_recipe_images(run.recipe, names)
+    keep_outs = tuple(with_object(entry, run) for entry in recipe.region.keep_out)
+    return replace(recipe, region=replace(recipe.region, keep_out=keep_outs))
+
+
+def with_object(keep_out: KeepOut, run: Run) -> KeepOut:
+    """The keep-out with the mesh file that it names as a hidden object of the open file."""
+    if keep_out.file is None:
+        return keep_out
+    [solid] = load_solids([keep_out.file], run.origin)["file", keep_out.file]
+    obj = bpy.data.objects.new(Path(keep_out.file).stem, mesh_of(solid.mesh))
+    bpy.context.scene.collection.objects.link(obj)
+    obj.hide_render = True
+    bpy.context.view_layer.update()
+    obj.hide_set(True)
+    return replace(keep_out, file=None, object=obj.name)
 
 
 def write_picture(path: Path, run: Run, size: tuple[int, int] = SIZE, up: Floats | None = None) -> None:

@@ -76,7 +76,7 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
         trouble = settings.trouble or live.trouble_of(obj)
         outdated = bool(trouble) or is_outdated(settings)
         run = runs.under_way()
-        if run is not None:
+        if run is not None and not run.ended:
             draw_progress(layout, run)
         if is_pattern(context.active_object) and context.mode == 'EDIT_MESH':
             self.draw_points(layout, settings)
@@ -101,12 +101,17 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
         layout.operator("bubble_pattern.remove", icon='TRASH')
 
     def draw_points(self, layout: bpy.types.UILayout, settings: Any) -> None:
-        """The points of the pattern are being edited: sizes can be fixed."""
+        """The points of the pattern are being edited: moved, pinned and settled, their sizes fixed."""
         count = settings.id_data.data.total_vert_sel
         text = f"{count:,} feature{'s' if count != 1 else ''} selected" if count else "Select features"
         layout.label(text=text, icon='VERTEXSEL')
-        large(layout).operator("bubble_pattern.fix_sizes", icon='PINNED')
-        layout.operator("bubble_pattern.free_sizes", icon='UNPINNED')
+        large(layout).operator("bubble_pattern.settle", icon='MOD_SMOOTH')
+        row = layout.row(align=True)
+        row.operator("bubble_pattern.pin", icon='PINNED')
+        row.operator("bubble_pattern.unpin", icon='UNPINNED')
+        row = layout.row(align=True)
+        row.operator("bubble_pattern.fix_sizes", icon='LOCKED')
+        row.operator("bubble_pattern.free_sizes", icon='UNLOCKED')
 
     def draw_applied(
         self, context: bpy.types.Context, layout: bpy.types.UILayout, obj: bpy.types.Object

@@ -65,7 +65,9 @@ def preset_text(obj: bpy.types.Object, context: bpy.types.Context) -> str:
     recipe = recipe_of(obj.bubble_pattern)
     packing = recipe.packing
     given = isinstance(packing.orientation, str)
-    packing = replace(packing, orientation=packing.orientation if given else "edge", symmetry_centre=None)
+    packing = replace(
+        packing, orientation=packing.orientation if given else "edge", symmetry_centre=None, pins=()
+    )
     recipe = replace(
         recipe,
         region=RegionChoice(),

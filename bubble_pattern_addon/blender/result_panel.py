@@ -13,6 +13,9 @@ from .recipe_operators import draw_files
 from .settings_recipe import is_outdated, length_text
 from .sidebar import SettingsPanel, columns, sentences, shown_settings
 
+# More nominal sizes than this are only counted.
+MOST_ROWS = 10
+
 
 class Figure(NamedTuple):
     """A row of the results: its name, what it says, and whether it is cause for alarm."""
@@ -101,9 +104,13 @@ def size_figures(context: bpy.types.Context, settings: Any) -> list[Figure]:
 
 
 def nominal_rows(context: bpy.types.Context, settings: Any) -> list[tuple[str, str]]:
-    """How many features have which nominal diameter, the largest at the end."""
+    """How many features have which nominal diameter, the largest at the end; where that is a long list, only
+    how many diameters there are.
+    """
     entries = [entry.split(",") for entry in settings.nominal.split(";") if entry]
-    return [(length_text(context, float(size)), f"{int(count):,}") for size, count in entries]
+    if len(entries) > MOST_ROWS:
+        return [("Sizes", f"{len(entries)}")]
+    return [(f"Size {length_text(context, float(size))}", f"{int(count):,}") for size, count in entries]
 
 
 def removed_figures(context: bpy.types.Context, settings: Any) -> list[Figure]:

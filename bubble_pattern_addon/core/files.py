@@ -9,7 +9,7 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,7 @@ from .errors import BaseError, OutputError
 from .mesh import Bools, Floats, Mesh
 from .paint import painted
 from .region import weld
-from .surroundings import Thing
+from .surroundings import Solid, Solids, Thing
 from .threemf import Piece, read_3mf, write_3mf
 
 SUFFIXES = (".stl", ".obj", ".ply", ".3mf", ".glb", ".gltf")
@@ -38,7 +38,7 @@ class LoadedBase:
     attributes, materials: name -> mask (T,) of the triangles that carry it
     values: name -> what is painted on the base, (T,) on faces, (T, 3) or (T, 3, channels) at corners
     uv_maps: name -> (T, 3, 2)
-    objects: name -> what stands beside the base
+    objects: name -> what stands beside the base; solids: bodies there that keep-outs name
     millimetres: how many of them its unit is long, None where the file does not say
     """
 
@@ -48,6 +48,7 @@ class LoadedBase:
     values: Mapping[str, Floats] = field(default_factory=dict, kw_only=True)
     uv_maps: Mapping[str, Floats] = field(default_factory=dict, kw_only=True)
     objects: Mapping[str, Thing] = field(default_factory=dict, kw_only=True)
+    solids: Solids = field(default_factory=dict, kw_only=True)
     millimetres: float | None = field(default=None, kw_only=True)
 
 
@@ -84,6 +85,12 @@ def load_base(path: Path) -> LoadedBase:
     masks = {name: column != 0 for name, column in values.items() if column.ndim == 1}
     uv_maps = _laid_end_to_end([piece.uv_maps for piece in pieces], pieces)
     return LoadedBase(weld(mesh), masks, materials, values=values, uv_maps=uv_maps, millimetres=millimetres)
+
+
+def load_solids(names: Iterable[str], folder: Path) -> Solids:
+    """The bodies in mesh files, named as seen from `folder`, upright. BaseError as load_base."""
+    upright = np.array([0.0, 0.0, 1.0])
+    return {("file", name): [Solid(load_base(folder / name).mesh, upright)] for name in sorted(set(names))}
 
 
 def _read(path: Path) -> tuple[list[Piece], float | None]:

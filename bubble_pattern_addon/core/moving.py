@@ -10,11 +10,12 @@ import numpy as np
 
 from .blending import FaceSet
 from .feature_recipe import Feature
+from .keep_out import frame_along
 from .mesh import Floats
 from .metric import Described, Places
 from .painted import Image, mean_normal, upward
 from .pattern import Pattern
-from .recipe import Recipe
+from .recipe import KeepOut, Recipe
 from .region import Region
 from .toml_values import Point
 
@@ -35,15 +36,18 @@ def moved_recipe(recipe: Recipe, matrix: Floats, region: Region) -> Recipe:
     if not isinstance(projection, str):
         projection = _turned(projection, matrix)
     centre = packing.symmetry_centre
+    keep_outs = tuple(_moved_keep_out(keep_out, matrix) for keep_out in choice.keep_out)
+    near = None if choice.near is None else _moved_point(choice.near, matrix)
     seeds = tuple(replace(seed, at=_moved_point(seed.at, matrix)) for seed in shaping.seeds)
     return replace(
         recipe,
-        region=replace(choice, near=None if choice.near is None else _moved_point(choice.near, matrix)),
+        region=replace(choice, near=near, keep_out=keep_outs),
         packing=replace(
             packing,
             pitch=moved(packing.pitch, matrix, region),
             orientation=orientation,
             symmetry_centre=None if centre is None else _moved_point(centre, matrix),
+            pins=tuple(_moved_point(pin, matrix) for pin in packing.pins),
         ),
         shaping=replace(shaping, diameter=moved(shaping.diameter, matrix, region), seeds=seeds),
         feature=moved_feature(recipe.feature, matrix, region),
@@ -85,6 +89,24 @@ def moved_feature(feature: Feature, matrix: Floats, region: Region) -> Feature:
     )
 
 
+def _moved_keep_out(keep_out: KeepOut, matrix: Floats) -> KeepOut:
+    """A keep-out after the motion; what the recipe leaves to its default is written out where that turns."""
+    found: dict[str, Point] = {}
+    for key in ("sphere", "cylinder", "box"):
+        at = getattr(keep_out, key)
+        if at is not None:
+            found[key] = _moved_point(at, matrix)
+    axis = keep_out.axis
+    if axis is None and (keep_out.cylinder or keep_out.box or keep_out.file):
+        axis = 0.0, 0.0, 1.0
+    if axis is not None:
+        found["axis"] = _turned(axis, matrix)
+    if keep_out.box is not None and axis is not None:
+        along = None if keep_out.along is None else np.array(keep_out.along)
+        found["along"] = _turned(_point(frame_along(np.array(axis), along)[0]), matrix)
+    return replace(keep_out, **found)  # type: ignore[arg-type]
+
+
 def moved(described: Described, matrix: Floats, region: Region) -> Described:
     """The field after the motion `matrix` (4, 4) of everything; `region`: where it is before."""
     result = _moved(described, matrix, region)
@@ -124,10 +146,13 @@ def _each(value: Any, change: Callable[[Point], Point]) -> Any:
 
 
 def _moved_point(point: Point, matrix: Floats) -> Point:
-    x, y, z = (matrix[:3, :3] @ np.array(point) + matrix[:3, 3]).tolist()
-    return x, y, z
+    return _point(matrix[:3, :3] @ np.array(point) + matrix[:3, 3])
 
 
 def _turned(vector: Point, matrix: Floats) -> Point:
-    x, y, z = (matrix[:3, :3] @ np.array(vector)).tolist()
+    return _point(matrix[:3, :3] @ np.array(vector))
+
+
+def _point(values: Floats) -> Point:
+    x, y, z = values.tolist()
     return x, y, z

@@ -9,6 +9,7 @@ from .errors import RecipeError
 from .feature_checks import check_feature
 from .field_tables import asks_for_pitch
 from .isometries import check_symmetry
+from .keep_out_checks import check_keep_outs
 from .metric import Constant, Described
 from .nominal import check_sizes
 from .processes import PROCESSES
@@ -47,6 +48,7 @@ def check_choice(choice: RegionChoice) -> None:
     check_at_least(choice.gap, 0, "[region] gap")
     if choice.gap and not choice.parts:
         raise RecipeError("[region] gap goes between parts: name these too, or leave gap out")
+    check_keep_outs(choice)
 
 
 def check_recipe(recipe: Recipe) -> None:
@@ -70,6 +72,9 @@ def check_recipe(recipe: Recipe) -> None:
     check_symmetry(packing.symmetry, "[packing] symmetry")
     for coordinate in packing.symmetry_centre or ():
         check_finite(coordinate, "[packing] symmetry_centre")
+    for pin in packing.pins:
+        for coordinate in pin:
+            check_finite(coordinate, "[packing] pins")
     check_feature(recipe.feature, uniform_diameter(recipe))
     _check_limits(limits)
     _check_solve(recipe)

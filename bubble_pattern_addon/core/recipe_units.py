@@ -11,7 +11,7 @@ from .blending import FaceSet, Fill, Product
 from .errors import RecipeError
 from .falloff import Graded
 from .metric import Constant, Described
-from .recipe import Recipe, Seed
+from .recipe import KeepOut, Recipe, Seed
 from .recipe_file import load_toml, recipe_from_dict
 from .units import Unit, millimetres_in, read_unit, unit_of
 
@@ -19,8 +19,8 @@ Scale = Callable[[float], float]
 
 # Keys whose numbers, points and fields are lengths; all other keys have no unit.
 LENGTHS = {
-    "region": ("near", "gap"),
-    "packing": ("pitch", "edge_offset", "symmetry_centre"),
+    "region": ("near", "gap", "keep_out"),
+    "packing": ("pitch", "edge_offset", "symmetry_centre", "pins"),
     "shaping": ("diameter", "seeds", "sizes"),
     "feature": ("depth", "height", "tolerance", "rim_size", "turn_point"),
     "limits": ("min_web", "min_margin", "min_diameter", "thickness"),
@@ -29,6 +29,8 @@ LENGTHS = {
 }
 # To so many digits: 1.2 mm are 0.0012 m, not 0.0011999999999999999.
 DIGITS = 12
+# The same of keep-outs.
+AROUND = ("sphere", "cylinder", "box", "diameter", "size", "reach", "margin")
 # The same of fields, besides their values, which are lengths where the field is one.
 PLACES = {"start", "end", "centre", "near", "points", "lines", "inner", "radius", "distance", "width"}
 
@@ -97,6 +99,8 @@ def _scaled(value: Any, scale: Scale, is_length: bool) -> Any:
         return tuple(_scaled(entry, scale, is_length) for entry in value)
     if isinstance(value, Seed):
         return Seed(_scaled(value.at, scale, True), _scaled(value.diameter, scale, True))
+    if isinstance(value, KeepOut):
+        return replace(value, **{key: _scaled(getattr(value, key), scale, True) for key in AROUND})
     if isinstance(value, (Described, FaceSet)):
         return _scaled_field(value, scale, is_length)
     return value

@@ -351,7 +351,7 @@ def test_two_patterns_make_one_part() -> None:
     assert is_closed(part.data)
     assert first.bubble_pattern.part == second.bubble_pattern.part == part
     second.bubble_pattern.depth = 0.0004
-    with pytest.raises(RuntimeError, match="different kinds"):
+    with pytest.raises(RuntimeError, match="different features"):
         bpy.ops.bubble_pattern.apply()
 
 
