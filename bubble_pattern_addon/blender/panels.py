@@ -123,8 +123,7 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
         if settings.verdict:
             sentences(layout, settings.verdict, context.region.width, 'ERROR')
         else:
-            features = nouns(settings.kind.lower(), settings.count)
-            layout.label(text=f"{features}, watertight", icon='CHECKMARK')
+            layout.label(text=f"{nouns(settings.kind.lower(), settings.count)}, watertight", icon='CHECKMARK')
         result_panel.draw_table(layout, result_panel.removed_figures(context, settings))
         large(layout).operator("bubble_pattern.edit", icon='GREASEPENCIL')
         draw_files(layout)

@@ -39,6 +39,7 @@ NUMBERS = ("float", "Point", "Described", "Size", "Seed", "KeepOut")
 GRADED = """
 [region]
 all = true
+keep_out = [{ cylinder = [40, 0, 0], diameter = 6, axis = [0, 0, 1], reach = 2, margin = 0.5 }]
 [packing]
 pitch = { kind = "linear", from = 1.6, to = 2.4, start = [-12, 0, 0], end = [12, 0, 0] }
 edge_offset = 0.1
@@ -94,6 +95,10 @@ def test_a_scaled_recipe_makes_the_same_pattern_on_a_scaled_base(factor: float) 
     )
     assert scaled.feature.depth == pytest.approx(0.5 * factor)
     assert scaled.packing.symmetry_centre == pytest.approx(np.array([1, 2, 3]) * factor)
+    (around,) = scaled.region.keep_out
+    assert around.cylinder == pytest.approx((40 * factor, 0, 0))
+    assert (around.diameter, around.reach, around.margin) == pytest.approx(np.array([6, 2, 0.5]) * factor)
+    assert around.axis == (0, 0, 1)
 
 
 def test_there_and_back_again_is_the_same_recipe() -> None:
