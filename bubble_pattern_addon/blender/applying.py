@@ -20,7 +20,7 @@ from .pattern_object import read_pattern
 from .properties import in_scene, pattern_objects
 from .provenance import Original, read_original
 from .reading import Base, evaluated_mesh, read_base, shown
-from .settings_recipe import is_outdated, recipe_of
+from .settings_recipe import is_outdated, part_text, recipe_of
 from .sources import read_source
 from .stepping import PATIENCE
 
@@ -55,6 +55,7 @@ def apply_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[tupl
     )
     for owner in owners:
         owner.bubble_pattern.part_removed = part.check.removed_volume
+        owner.bubble_pattern.part_made_with = part_text(owner.bubble_pattern)
     return place_part(base_object, owners, mesh, verdict_of(part), context), part
 
 

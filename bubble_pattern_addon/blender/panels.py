@@ -124,6 +124,7 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
             sentences(layout, settings.verdict, context.region.width, 'ERROR')
         else:
             layout.label(text=f"{nouns(settings.kind.lower(), settings.count)}, watertight", icon='CHECKMARK')
+        result_panel.draw_table(layout, result_panel.removed_figures(context, settings))
         large(layout).operator("bubble_pattern.edit", icon='GREASEPENCIL')
         draw_files(layout)
         layout.operator("bubble_pattern.remove", icon='TRASH')

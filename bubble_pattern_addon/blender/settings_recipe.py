@@ -165,6 +165,16 @@ def recipe_text(recipe: Recipe) -> str:
     return recipe_to_toml(replace(recipe, feature=feature, output=shaping_output(recipe)))
 
 
+def part_text(settings: Any) -> str:
+    """What a part made of this pattern depends on, as text; nothing where the settings make no sense."""
+    try:
+        recipe = recipe_of(settings)
+    except RecipeError:
+        return ""
+    shape = recipe_to_toml(replace(recipe, output=shaping_output(recipe)))
+    return "\n".join([shape, settings.made_with, settings.fingerprint, settings.size_trace])
+
+
 def is_outdated(settings: Any) -> bool:
     """Whether the settings say something else than the points that stand there."""
     try:
