@@ -49,11 +49,12 @@ def toggle_cut(settings: Any, context: bpy.types.Context) -> None:
 
 
 def show_cut(obj: bpy.types.Object, context: bpy.types.Context) -> None:
-    """Show the base of the pattern `obj` with the holes that Apply would make.
+    """Show the base of the pattern `obj` with the features that Apply would make.
 
     Raises PatternError where there is nothing to cut, or Blender's modifier does not cut it.
     """
     from ..core.solid import plan_steps
+    from .feature_objects import stamp_of
     from .pattern_object import read_pattern
     from .sources import read_source
 
@@ -65,13 +66,13 @@ def show_cut(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     ):
         raise RegionError("The pattern is out of date: press Update before the cut is shown")
     pattern = read_pattern(obj, source.base.mesh)
-    plan = drive(plan_steps(source.base.mesh, pattern, recipe.feature))
+    plan = drive(plan_steps(source.base.mesh, pattern, recipe.feature, stamp_of(recipe.feature, context)))
     if not len(plan.cutters.mesh.triangles):
         raise RegionError("There is no feature that can be cut: Apply tells why")
     before = face_count(base, context)
     cutters = cutters_object(obj, plan.cutters.mesh)
     modifier = base.modifiers.new(MODIFIER, 'BOOLEAN')
-    modifier.operation = 'DIFFERENCE'
+    modifier.operation = 'UNION' if recipe.feature.adds else 'DIFFERENCE'
     modifier.object = cutters
     modifier.show_expanded = False
     obj.hide_set(True)  # its discs would fill the holes
