@@ -13,7 +13,7 @@ from ..core.several import Layer, layered_steps
 from ..core.sides import check_one_side
 from ..core.solid import Part, Plan, cutting_seconds
 from .feature_objects import stamp_of
-from .generation import show_part, update_steps
+from .generation import renewing_steps, show_part
 from .live import has_window
 from .part_mesh import build_part_mesh
 from .pattern_object import read_pattern
@@ -42,7 +42,7 @@ def apply_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[tupl
             check_one_side(source.base.mesh, source.selected)
         now = (source.fingerprint, source.size_trace)
         if now != (settings.fingerprint, settings.size_trace) or is_outdated(settings):
-            yield from update_steps(owner, context)
+            yield from renewing_steps(owner, context)
     base, original = read_whole(base_object, context)
     layers = layers_of(owners, base, context)
     places = end_to_end([layer.pattern.places for layer in layers])

@@ -69,6 +69,23 @@ class OnPattern:
         return poll_pattern(cls, context) and poll_object_mode(cls, context)
 
 
+class AnewOperator(SteppedOperator):
+    """Mixin for an operator that lays the current pattern anew: it asks before hand work is thrown away."""
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Ask where there is something to lose, or work at once."""
+        if not current_pattern(context).bubble_pattern.hand_made:
+            return super().invoke(context, event)
+        return context.window_manager.invoke_confirm(  # type: ignore[no-any-return]
+            self,
+            event,
+            title="Lay the pattern anew?",
+            message="It was settled by hand. Only pinned features will stay where they are.",
+            confirm_text="Lay Anew",
+            icon='WARNING',
+        )
+
+
 class LayingOperator(SteppedOperator):
     """Mixin for an operator that lays a pattern: its steps end with the pattern's object."""
 
@@ -165,7 +182,7 @@ class BUBBLE_PATTERN_OT_add(LayingOperator, bpy.types.Operator):
         self.pitch = settings.pitch
 
 
-class BUBBLE_PATTERN_OT_update(OnPattern, LayingOperator, bpy.types.Operator):
+class BUBBLE_PATTERN_OT_update(OnPattern, AnewOperator, LayingOperator, bpy.types.Operator):
     """Lay the pattern anew by its settings, on the base as it is now"""
 
     bl_idname = "bubble_pattern.update"
@@ -178,20 +195,6 @@ class BUBBLE_PATTERN_OT_update(OnPattern, LayingOperator, bpy.types.Operator):
         description="A setting has changed; what is wrong with it stands in the sidebar",
         options={'HIDDEN', 'SKIP_SAVE'},
     )
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Ask before hand work is thrown away."""
-        settings = current_pattern(context).bubble_pattern
-        if not settings.hand_made:
-            return super().invoke(context, event)
-        return context.window_manager.invoke_confirm(  # type: ignore[no-any-return]
-            self,
-            event,
-            title="Lay the pattern anew?",
-            message="It was settled by hand. Only pinned features will stay where they are.",
-            confirm_text="Update",
-            icon='WARNING',
-        )
 
     def about(self, context: bpy.types.Context) -> int:
         number: int = current_pattern(context).session_uid

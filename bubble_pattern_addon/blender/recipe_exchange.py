@@ -60,7 +60,7 @@ def recipe_to_share(obj: bpy.types.Object, context: bpy.types.Context) -> str:
 
 def preset_text(obj: bpy.types.Object, context: bpy.types.Context) -> str:
     """The recipe of the pattern `obj` in millimetres, without what belongs to its part alone: the region,
-    fixed sizes, the rows' direction, a point of symmetry.
+    fixed sizes and pins, the rows' direction, a point of symmetry.
     """
     recipe = recipe_of(obj.bubble_pattern)
     packing = recipe.packing

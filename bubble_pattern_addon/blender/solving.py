@@ -10,9 +10,8 @@ import bpy
 from ..core.progress import Progress, Steps, within
 from ..core.recipe import Recipe
 from .making_recipe import solve_of
-from .operators import OnPattern, current_pattern
+from .operators import AnewOperator, OnPattern, current_pattern
 from .settings_recipe import length_text, recipe_of, take_packing, take_shaping
-from .stepping import SteppedOperator
 
 
 def target_steps(obj: bpy.types.Object, context: bpy.types.Context, recipe: Recipe) -> Steps[Any]:
@@ -39,7 +38,7 @@ def target_steps(obj: bpy.types.Object, context: bpy.types.Context, recipe: Reci
     return solved
 
 
-class BUBBLE_PATTERN_OT_solve(OnPattern, SteppedOperator, bpy.types.Operator):
+class BUBBLE_PATTERN_OT_solve(OnPattern, AnewOperator, bpy.types.Operator):
     """Find the diameter or the pitch at which the pattern comes to the target"""
 
     bl_idname = "bubble_pattern.solve"
