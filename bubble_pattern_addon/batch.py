@@ -20,25 +20,31 @@ from typing import Any, NoReturn, Protocol, cast
 
 import numpy as np
 
+from .core.drawing import Drawing, make_drawing
+from .core.drawing_files import drawing_report, write_drawing
+from .core.drawn_shapes import drawn_shapes
 from .core.errors import BaseError, FieldError, OutputError, PatternError
 from .core.export import make_report, write_features, write_report
 from .core.feature_recipe import nouns
 from .core.field_tables import Wanted
-from .core.files import LoadedBase, load_base, output_folder, write_mesh
+from .core.files import LoadedBase, load_base, load_solids, output_folder, write_mesh
+from .core.keep_out import region_with_keep_outs
 from .core.mesh import Bools, Floats, Mesh
 from .core.pattern import Pattern
 from .core.pipeline import pattern_steps
 from .core.progress import Progress, Result, Steps, drive, within
-from .core.recipe import Recipe, default_recipe
+from .core.recipe import KeepOut, Recipe, RegionChoice, default_recipe
 from .core.recipe_file import load_recipe, recipe_to_toml
 from .core.recipe_names import recipe_names, with_recipe_images
-from .core.region import Region, make_region
+from .core.recipe_units import load_fitted_recipe
+from .core.region import Region
 from .core.selection import select, sub_regions
 from .core.sides import check_one_side
 from .core.solid import Part, part_steps
 from .core.solving import solving_steps
 from .core.soundness import sound_base
 from .core.surroundings import Surroundings
+from .core.units import millimetres_in
 from .terminal import line_on, silenced
 
 EXAMPLE = """\
@@ -60,7 +66,8 @@ example of a run:
 class Run:
     """Everything a batch run knows when the part is made.
 
-    selected: (T,) the target region's triangles; origin: the folder from which the recipe names its images
+    selected: (T,) the target region's triangles; origin: the folder from which the recipe names its images;
+    drawing: of the pattern, where the recipe asks for one; millimetres: in a unit of the base
     """
 
     recipe: Recipe
@@ -71,14 +78,16 @@ class Run:
     part: Part
     report: Mapping[str, Any]
     origin: Path = Path()
+    drawing: Drawing | None = None
+    millimetres: float = 1.0
 
 
 class BlenderSide(Protocol):
     """What `blender.batch_base` does for a batch run."""
 
-    def read_base(self, path: Path | None, names: Wanted) -> LoadedBase:
-        """The base in a .blend file, in world coordinates, with what `names` asks for; None: in the file that
-        is open.
+    def read_base(self, path: Path | None, names: Wanted, keep_outs: Sequence[KeepOut]) -> LoadedBase:
+        """The base in a .blend file, in world coordinates, with what `names` and `keep_outs` ask for; None:
+        in the file that is open.
         """
         ...
 
@@ -109,11 +118,15 @@ def run_steps(base: LoadedBase, recipe_file: Path) -> Steps[Run]:
     """
     clock = Clock()
     yield Progress("Reading the region", 0.0)
-    choice = load_recipe(recipe_file).region
+    choice = recipe_for(base, recipe_file).region
     selected = select(base.mesh, choice, base.attributes, base.materials)
     parts = sub_regions(choice, base.attributes, base.materials)
-    region = make_region(base.mesh, selected, parts, choice.gap)
-    recipe = load_recipe(recipe_file, default_recipe(region.area, region.perimeter))
+    masks = {**base.materials, **base.attributes}
+    files = [keep_out.file for keep_out in choice.keep_out if keep_out.file is not None]
+    solids = {**base.solids, **load_solids(files, recipe_file.parent)}
+    region = region_with_keep_outs(base.mesh, selected, parts, choice.gap, choice.keep_out, masks, solids)
+    recipe = recipe_for(base, recipe_file, region)
+    millimetres = base.millimetres or millimetres_in(recipe.output.unit or "mm")
     sound_base(base.mesh)  # step 3 looks again; but nobody shall wait for a packing to be told of a hole
     if recipe.feature.through:
         check_one_side(base.mesh, selected)
@@ -125,12 +138,28 @@ def run_steps(base: LoadedBase, recipe_file: Path) -> Steps[Run]:
         recipe, pattern = solved.recipe, solved.pattern
     else:
         pattern = yield from clock.timed(within(pattern_steps(region, recipe, surroundings), 0.0, 0.5))
+    drawing = draw(region, pattern, recipe, millimetres) if recipe.output.drawings else None
     part = yield from within(part_steps(base.mesh, pattern, recipe.feature, stamp), 0.5, 1.0)
     clock.stop("add")
-    report = make_report(region, pattern, part, clock.seconds, recipe, solved)
+    report = make_report(region, pattern, part, clock.seconds, recipe, solved) | drawing_report(drawing)
     if part.check.problems:
         raise BaseError(f"The part is not good: {' '.join(part.check.problems)}")
-    return Run(recipe, base, selected, region, pattern, part, report, recipe_file.parent)
+    origin = recipe_file.parent
+    return Run(recipe, base, selected, region, pattern, part, report, origin, drawing, millimetres)
+
+
+def recipe_for(base: LoadedBase, recipe_file: Path, region: Region | None = None) -> Recipe:
+    """The recipe in a file, in the unit of the base where both say theirs, with what it leaves out fitted to
+    the region.
+    """
+    fitting = Recipe() if region is None else default_recipe(region.area, region.perimeter)
+    return load_fitted_recipe(recipe_file, fitting, base.millimetres)
+
+
+def draw(region: Region, pattern: Pattern, recipe: Recipe, millimetres: float) -> Drawing:
+    """The drawing that the recipe asks for. RegionError where the region can't be drawn so."""
+    shapes = drawn_shapes(pattern, recipe.feature)
+    return make_drawing(region, pattern, recipe.output.projection, recipe.output.align, millimetres, shapes)
 
 
 def read_images(recipe: Recipe, folder: Path) -> dict[str, Floats]:
@@ -213,7 +242,10 @@ def write_run(run: Run, folder: Path, blender: Callable[[], BlenderSide]) -> Non
     """All files of a run, into a folder that is there (see files.output_folder)."""
     write_mesh(folder / "part.stl", run.part.mesh)
     for name in run.recipe.output.formats:
-        write_mesh(folder / f"part.{name}", run.part.mesh)
+        write_mesh(folder / f"part.{name}", run.part.mesh, run.millimetres)
+    for name in run.recipe.output.drawings:
+        assert run.drawing is not None
+        write_drawing(folder / f"pattern.{name}", run.drawing)
     write_features(folder / "features.csv", run.pattern)
     write_report(folder / "report.json", run.report)
     recipe = with_copied_files(run, folder)
@@ -225,7 +257,7 @@ def write_run(run: Run, folder: Path, blender: Callable[[], BlenderSide]) -> Non
 
 
 def with_copied_files(run: Run, folder: Path) -> Recipe:
-    """The recipe with the files that it names, images and a mesh, copied beside it: there it makes the same
+    """The recipe with the files that it names, images and meshes, copied beside it: there it makes the same
     part.
     """
     names: dict[str, str] = {}
@@ -238,7 +270,19 @@ def with_copied_files(run: Run, folder: Path) -> Recipe:
     if mesh is not None and (run.origin / mesh).is_file():
         shutil.copyfile(run.origin / mesh, folder / f"feature{Path(mesh).suffix}")
         recipe = replace(recipe, feature=replace(recipe.feature, mesh=f"feature{Path(mesh).suffix}"))
-    return recipe
+    return replace(recipe, region=with_copied_keep_outs(recipe.region, run.origin, folder))
+
+
+def with_copied_keep_outs(choice: RegionChoice, origin: Path, folder: Path) -> RegionChoice:
+    """The choice with the mesh files of its keep-outs, as seen from `origin`, copied into the folder."""
+    entries = []
+    for number, entry in enumerate(choice.keep_out, 1):
+        copied = entry.file
+        if copied is not None:
+            copied = f"keep_out_{number}{Path(copied).suffix}"
+            shutil.copyfile(origin / str(entry.file), folder / copied)
+        entries.append(replace(entry, file=copied))
+    return replace(choice, keep_out=tuple(entries))
 
 
 def blender_side() -> BlenderSide:
@@ -283,16 +327,18 @@ def parse(arguments: Sequence[str], prog: str) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def read_base(path: Path | None, in_blender: bool, names: Wanted) -> LoadedBase:
-    """The base that the command line names, with what `names` asks for; None is the file open in Blender."""
+def read_base(path: Path | None, in_blender: bool, names: Wanted, keep_outs: Sequence[KeepOut]) -> LoadedBase:
+    """The base that the command line names, with what `names` and `keep_outs` ask for; None is the file open
+    in Blender.
+    """
     if path is None:
         if not in_blender:
             raise BaseError("No base is given: add --base MODEL")
-        return blender_side().read_base(None, names)
+        return blender_side().read_base(None, names, keep_outs)
     if path.suffix.lower() == ".blend":
         if not path.exists():
             raise BaseError(f"Base {path} does not exist: check the path")
-        return blender_side().read_base(path, names)
+        return blender_side().read_base(path, names, keep_outs)
     return load_base(path)
 
 
@@ -316,7 +362,7 @@ def main(
         recipe = load_recipe(options.recipe)  # nonsense is told before a long read
         with hushed():
             names = recipe_names(recipe)
-            base = read_base(options.base, in_blender, names)
+            base = read_base(options.base, in_blender, names, recipe.region.keep_out)
         with output_folder(options.out) as folder:
             run = drive(run_steps(base, options.recipe), show)
             with hushed():

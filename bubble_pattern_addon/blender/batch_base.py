@@ -6,7 +6,7 @@ writes.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,18 +17,17 @@ import numpy as np
 
 from ..core.errors import BaseError, OutputError
 from ..core.field_tables import NO_NAMES, Wanted
-from ..core.files import LoadedBase, load_base
+from ..core.files import LoadedBase, load_base, load_solids
 from ..core.mesh import Bools, Floats, Mesh
-from ..core.metric import Places
-from ..core.moving import moved_recipe
-from ..core.pattern import Pattern
+from ..core.moving import moved_pattern, moved_recipe
 from ..core.quality import measure
-from ..core.recipe import Recipe
+from ..core.recipe import KeepOut, Recipe
 from ..core.recipe_names import recipe_names, with_recipe_images
 from .applying import place_part, verdict_of
 from .attributes import CORNER_VERTEX, MATERIAL, write_values
 from .feature_objects import read_stamp as read_object_stamp
 from .generation import fill_settings, measured, put
+from .keep_outs import read_solids
 from .marked_side import on_marked_side
 from .part_mesh import build_part_mesh
 from .pattern_object import new_pattern_object
@@ -37,12 +36,13 @@ from .pixels import load_image
 from .pixels import read_image as read_image
 from .properties import is_pattern
 from .provenance import Original, read_original
-from .reading import Base, evaluated_mesh, transformed, world_frame
+from .reading import Base, evaluated_mesh, world_frame
 from .reading import read_base as read_object
 from .settings_recipe import recipe_of
 from .sources import read_source
 from .surroundings import read_painted, with_things
 from .target_region import ATTRIBUTE, store, stored
+from .units import scene_millimetres
 
 if TYPE_CHECKING:
     from ..batch import Run
@@ -77,9 +77,9 @@ def registered() -> Iterator[None]:
 # -- in ------------------------------------------------------------------------------------------------------
 
 
-def read_base(path: Path | None, names: Wanted = NO_NAMES) -> LoadedBase:
+def read_base(path: Path | None, names: Wanted = NO_NAMES, keep_outs: Sequence[KeepOut] = ()) -> LoadedBase:
     """The base in a .blend file, with its modifiers and in world coordinates, and of what is painted on it or
-    stands beside it what `names` asks for; None: in the file that is open.
+    stands beside it what `names` and `keep_outs` ask for; None: in the file that is open.
 
     Raises BaseError where the file is no .blend, or which of its objects is meant cannot be told.
     """
@@ -95,6 +95,7 @@ def read_base(path: Path | None, names: Wanted = NO_NAMES) -> LoadedBase:
             base = read_object(obj, mesh, WORLD)
             painted = read_painted(obj, mesh, base, replace(names, images=frozenset()))
         around = with_things(painted, names, WORLD, bpy.context)
+        solids = read_solids([entry for entry in keep_outs if entry.file is None], WORLD, bpy.context)
         marks = {name: on_marked_side(obj, base, name, mask) for name, mask in base.attributes.items()}
     return BlendBase(
         base.mesh,
@@ -104,6 +105,8 @@ def read_base(path: Path | None, names: Wanted = NO_NAMES) -> LoadedBase:
         values=around.attributes,
         uv_maps=around.uv_maps,
         objects=around.objects,
+        solids=solids,
+        millimetres=scene_millimetres(bpy.context.scene),
     )
 
 
@@ -150,7 +153,7 @@ def write_blend(path: Path, run: Run) -> None:
         fill_settings(pattern_obj, base_obj, region, moved_recipe(with_files_in(run), to_frame, run.region))
         recipe = recipe_of(pattern_obj.bubble_pattern)
         source = read_source(base_obj, region, bpy.context, recipe)
-        own = moved(run.pattern, to_frame)
+        own = moved_pattern(run.pattern, to_frame)
         laid = measured(own, source.region, recipe, measure(own, source.region))
         laid = replace(laid, seconds=run.report["seconds"]["pack"])
         put(pattern_obj, source, recipe, laid)
@@ -163,8 +166,8 @@ def write_blend(path: Path, run: Run) -> None:
 
 
 def with_files_in(run: Run) -> Recipe:
-    """The recipe with the files that it names, images and a mesh, taken into the open file, under names that
-    fit there.
+    """The recipe with the image and mesh files that it names taken into the open file, under names that fit
+    there.
     """
     names: dict[str, str] = {}
     for name in sorted(recipe_names(run.recipe).images):
@@ -175,6 +178,8 @@ def with_files_in(run: Run) -> Recipe:
             image.use_fake_user = True  # a field that is kept as text does not hold it
             names[name] = image.name
     recipe = with_recipe_images(run.recipe, names)
+    keep_outs = tuple(with_object(entry, run) for entry in recipe.region.keep_out)
+    recipe = replace(recipe, region=replace(recipe.region, keep_out=keep_outs))
     mesh = recipe.feature.mesh
     if mesh is not None and (run.origin / mesh).is_file():
         name = stand_aside(Path(mesh).stem, load_base(run.origin / mesh).mesh)
@@ -182,13 +187,20 @@ def with_files_in(run: Run) -> Recipe:
     return recipe
 
 
+def with_object(keep_out: KeepOut, run: Run) -> KeepOut:
+    """The keep-out with the mesh file that it names as a hidden object of the open file."""
+    if keep_out.file is None:
+        return keep_out
+    [solid] = load_solids([keep_out.file], run.origin)["file", keep_out.file]
+    return replace(keep_out, file=None, object=stand_aside(Path(keep_out.file).stem, solid.mesh))
+
+
 def stand_aside(name: str, body: Mesh) -> str:
     """Put a mesh into the open file as a hidden object, and say what it is called there."""
-    mesh = bpy.data.meshes.new(name)
-    mesh.from_pydata(body.vertices.tolist(), [], body.triangles.tolist())
-    obj = bpy.data.objects.new(name, mesh)
-    bpy.context.collection.objects.link(obj)
+    obj = bpy.data.objects.new(name, mesh_of(body))
+    bpy.context.scene.collection.objects.link(obj)
     obj.hide_render = True
+    bpy.context.view_layer.update()
     obj.hide_set(True)
     return obj.name
 
@@ -290,16 +302,3 @@ def mark(obj: bpy.types.Object, region: str, base: Base, selected: Bools) -> Non
     marked = np.zeros(len(obj.data.polygons), dtype=bool)
     marked[base.polygon[selected]] = True
     store(obj, region, marked)
-
-
-def moved(pattern: Pattern, matrix: Floats) -> Pattern:
-    """`pattern` after the rigid motion `matrix` (4, 4)."""
-    turn = matrix[:3, :3].T
-    places = pattern.places
-    return replace(
-        pattern,
-        places=Places(transformed(places.position, matrix), places.triangle, places.barycentric),
-        normal=pattern.normal @ turn,
-        tangent=pattern.tangent @ turn,
-        dropped=None if pattern.dropped is None else moved(pattern.dropped, matrix),
-    )

@@ -28,7 +28,7 @@ def length_property(name: str, description: str, default: float = 0.0, **options
         description=description,
         subtype='DISTANCE',
         default=default,
-        step=1,
+        step=0.002,  # in hundredths of a meter: the mouse drags by a few tenths of a millimeter
         precision=4,
         **options,
     )

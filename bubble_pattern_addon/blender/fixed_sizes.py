@@ -16,6 +16,7 @@ from ..core.mesh import Floats, Ints
 from ..core.pattern import all_bubbles
 from ..core.progress import drive
 from .attributes import read_values
+from .edit_undo import take_all_back
 from .field_properties import length_property, point_of, typed
 from .operators import OnPattern, current_pattern, poll_pattern, refused
 from .properties import is_pattern
@@ -42,6 +43,8 @@ class SizesOperator:
         finally:
             if editing:
                 bpy.ops.object.mode_set(mode='EDIT')
+        if editing:
+            take_all_back()
         return {'FINISHED'}
 
     def change(self, obj: bpy.types.Object, context: bpy.types.Context, editing: bool) -> None:

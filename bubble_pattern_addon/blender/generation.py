@@ -23,7 +23,7 @@ from ..core.recipe_file import recipe_from_dict
 from ..core.region import Region
 from ..core.results import Results, results_of
 from ..core.shaping import reshaped
-from . import live, runs
+from . import live
 from .noting import note_quality, note_results, noted_quality
 from .pattern_object import read_pattern, write_pattern, write_sizes
 from .preview_nodes import show_preview
@@ -93,6 +93,7 @@ def put(obj: bpy.types.Object, source: Source, recipe: Recipe, laid: Laid) -> No
     """Write what was laid to the pattern's object."""
     settings = obj.bubble_pattern
     write_pattern(obj, laid.pattern, settings.base, source.base)
+    settings.hand_made = False
     note(settings, source, recipe, laid)
     note_quality(settings, laid.quality)
     settings.seconds = laid.seconds
@@ -126,11 +127,12 @@ def update_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[Non
 def react(settings: Any, context: bpy.types.Context, repack: bool) -> None:
     """Answer a change of a setting in the panel: lay or shape the pattern anew; see live."""
     obj = settings.id_data
-    if not answers(settings, context):
+    if not answers(settings, context) or live.is_taken_up(obj):
         return
+    if settings.hand_made and (repack or not is_only_shape(settings)):
+        return  # hand work is not thrown away without being asked
     try:
         if not repack and is_only_shape(settings):
-            runs.stop()
             reshape(obj, context)
         elif live.has_window():
             live.lay(obj, context, update_steps(obj, context), settings.seconds)
@@ -166,6 +168,11 @@ def reshape(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     recipe = recipe_of(settings)
     source = read_source(settings.base, settings.region, context, recipe)
     if source.fingerprint != settings.fingerprint:
+        if settings.hand_made:
+            raise PatternError(
+                "The base has changed since the features were settled by hand: update the pattern, which "
+                "keeps only those that are pinned"
+            )
         drive(update_steps(obj, context))
         return
     pattern = reshaped(read_pattern(obj, source.base.mesh), source.region, recipe, source.surroundings)

@@ -23,13 +23,10 @@ from . import runs, watching
 from .cut_preview import cut_modifiers
 from .properties import in_scene, is_pattern, pattern_of
 from .settings_recipe import is_outdated, recipe_of, spoken
+from .stepping import PATIENCE, REST
 
-# A pattern is laid when no setting has changed for so long, in seconds.
-REST = 0.1
 # Changes nearer to each other than this are of one drag of the mouse.
 BURST = 0.5
-# Longer than this, in seconds, a change does not wait for its answer.
-PATIENCE = 0.4
 # A base that has changed is looked at when it has been left alone for so long.
 QUIET = 0.3
 
@@ -61,21 +58,31 @@ def has_window() -> bool:
 # -- changes of settings -------------------------------------------------------------------------------------
 
 
+def is_taken_up(obj: bpy.types.Object) -> bool:
+    """Whether a run under way lays the pattern `obj`: it will begin again with the change, at its time."""
+    run = runs.under_way()
+    if run is None or run.about != obj.session_uid:
+        return False
+    run.changed_at = time.perf_counter()
+    return True
+
+
 def lay(obj: bpy.types.Object, context: bpy.types.Context, steps: Steps[None], seconds: float) -> None:
     """Let `steps`, which are expected to take `seconds`, lay the pattern `obj`: now, or when the mouse rests.
 
     Raises PatternError from the steps that are taken now.
     """
-    runs.stop()  # it would lay what is no longer wanted
     now = time.perf_counter()
     alone, _live.changed_at = now - _live.changed_at > BURST, now
     if alone and seconds <= PATIENCE:
         run = runs.begin(steps)
-        run.advance(PATIENCE)
+        try:
+            run.advance(PATIENCE)
+        finally:
+            run.stop()
         _live.changed_at = time.perf_counter()
         if run.ended:
             return
-        run.stop()
     steps.close()
     lay_soon(obj)
 
@@ -106,18 +113,8 @@ def lay_waiting() -> None:
             continue
         with inside(window):
             if bpy.ops.bubble_pattern.update.poll():
-                try_update()
+                bpy.ops.bubble_pattern.update('INVOKE_DEFAULT', follows=True)
         return
-
-
-def try_update() -> None:
-    """Press Update; what it reports as an error stands in the sidebar already."""
-    obj = pattern_of(bpy.context.view_layer.objects.active)
-    try:
-        bpy.ops.bubble_pattern.update('INVOKE_DEFAULT')
-    except RuntimeError as error:
-        if obj is not None:
-            obj.bubble_pattern.trouble = str(error).removeprefix("Error: ").strip()
 
 
 def inside(window: bpy.types.Window) -> AbstractContextManager[None]:
@@ -178,7 +175,8 @@ def can_be_looked_at(base: bpy.types.Object) -> bool:
 def is_behind(obj: bpy.types.Object) -> bool:
     """Whether the settings want another pattern than stands there, one that would not take long."""
     settings = obj.bubble_pattern
-    return is_outdated(settings) and not settings.trouble and settings.seconds <= PATIENCE
+    quick = settings.seconds <= PATIENCE and not settings.hand_made
+    return is_outdated(settings) and not settings.trouble and quick
 
 
 def patterns_shown() -> Iterator[tuple[bpy.types.Object, bpy.types.Context]]:

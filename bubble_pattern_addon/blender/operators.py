@@ -11,12 +11,13 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, FloatProperty
 
+from ..core.errors import PatternError
 from ..core.feature_recipe import nouns
 from ..core.progress import Progress, Steps
 from .cut_preview import hide_cut
 from .field_properties import length_property, typed
 from .properties import in_scene, is_pattern, pattern_objects, pattern_of
-from .settings_recipe import recipe_of
+from .settings_recipe import recipe_of, spoken
 from .stepping import SteppedOperator
 from .target_region import free_name, selected_faces, store, stored, trying_region, wanted_faces
 
@@ -171,6 +172,39 @@ class BUBBLE_PATTERN_OT_update(OnPattern, LayingOperator, bpy.types.Operator):
     bl_label = "Update"
     bl_options = {'REGISTER', 'UNDO'}
     heeds_sidebar = True
+
+    follows: BoolProperty(
+        name="Follow",
+        description="A setting has changed; what is wrong with it stands in the sidebar",
+        options={'HIDDEN', 'SKIP_SAVE'},
+    )
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Ask before hand work is thrown away."""
+        settings = current_pattern(context).bubble_pattern
+        if not settings.hand_made:
+            return super().invoke(context, event)
+        return context.window_manager.invoke_confirm(  # type: ignore[no-any-return]
+            self,
+            event,
+            title="Lay the pattern anew?",
+            message="It was settled by hand. Only pinned features will stay where they are.",
+            confirm_text="Update",
+            icon='WARNING',
+        )
+
+    def about(self, context: bpy.types.Context) -> int:
+        number: int = current_pattern(context).session_uid
+        return number
+
+    def may_be_dragged(self) -> bool:
+        return self.follows
+
+    def refuse(self, error: PatternError, context: bpy.types.Context) -> set[str]:
+        if not self.follows:
+            return super().refuse(error, context)
+        current_pattern(context).bubble_pattern.trouble = spoken(error, context)
+        return {'CANCELLED'}
 
     def steps(self, context: bpy.types.Context) -> Steps[bpy.types.Object]:
         from . import generation

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from .field_panels import draw_field
-from .sidebar import SettingsPanel, columns, shown_settings
+from .sidebar import SettingsPanel, columns, sentences, shown_settings
 
 
 class BUBBLE_PATTERN_PT_packing(SettingsPanel, bpy.types.Panel):
@@ -24,6 +24,20 @@ class BUBBLE_PATTERN_PT_packing(SettingsPanel, bpy.types.Panel):
             column.prop(settings, "rows_along", text=" ")
         draw_symmetry(column, settings)
         column.prop(settings, "seed")
+        if context.mode == 'OBJECT':
+            column.operator("bubble_pattern.edit_sizes", text="Edit Points", icon='EDITMODE_HLT')
+        draw_hand_work(self.layout, settings, context)
+
+
+def draw_hand_work(
+    layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, context: bpy.types.Context
+) -> None:
+    """How many features are pinned, and that others were placed by hand."""
+    if settings.pins:
+        layout.label(text=f"{len(settings.pins):,} pinned", icon='PINNED')
+    if settings.hand_made:
+        words = "Settled by hand: Update keeps only pinned features"
+        sentences(layout, words, context.region.width, 'INFO')
 
 
 def draw_symmetry(column: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:

@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import bpy
 from bpy.props import (
     BoolProperty,
+    CollectionProperty,
     EnumProperty,
     FloatProperty,
     FloatVectorProperty,
@@ -16,6 +18,14 @@ from ..core.isometries import MOST_FOLD
 from ..core.recipe import Packing
 from .field_properties import SIZE, BubblePatternField, length_property
 from .reacting import repack
+
+
+class BubblePatternPin(bpy.types.PropertyGroup):
+    """A feature that stays where it is, by its place in the frame of the base."""
+
+    at: FloatVectorProperty(
+        name="Place", description="Where the feature is", size=3, subtype='TRANSLATION', precision=6
+    )
 
 
 class PackingSettings:
@@ -139,4 +149,9 @@ class PackingSettings:
         max=1.0,
         precision=5,
         update=repack,
+    )
+    pins: CollectionProperty(
+        name="Pinned Features",
+        description="Features that stay where they are, whatever happens to the others",
+        type=BubblePatternPin,
     )

@@ -17,7 +17,9 @@ from . import (
     runs,
     shaping_panel,
 )
+from .presets import BUBBLE_PATTERN_PT_presets
 from .properties import in_scene, is_pattern, pattern_objects, pattern_of
+from .recipe_operators import draw_files
 from .settings_recipe import is_outdated
 from .sidebar import SidebarPanel, is_applied, large, sentences
 from .stepping import draw_progress
@@ -27,6 +29,11 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
     """Region, and the buttons."""
 
     bl_label = "Bubble Pattern"
+
+    def draw_header_preset(self, context: bpy.types.Context) -> None:
+        """Blender's menu of presets, where there is a pattern to lay by one."""
+        if pattern_of(context.active_object) is not None:
+            BUBBLE_PATTERN_PT_presets.draw_panel_header(self.layout)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, active = self.layout, context.active_object
@@ -70,7 +77,7 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
         trouble = settings.trouble or live.trouble_of(obj)
         outdated = bool(trouble) or is_outdated(settings)
         run = runs.under_way()
-        if run is not None:
+        if run is not None and not run.ended:
             draw_progress(layout, run)
         if is_pattern(context.active_object) and context.mode == 'EDIT_MESH':
             self.draw_points(layout, settings)
@@ -95,12 +102,17 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
         layout.operator("bubble_pattern.remove", icon='TRASH')
 
     def draw_points(self, layout: bpy.types.UILayout, settings: Any) -> None:
-        """The points of the pattern are being edited: sizes can be fixed."""
+        """The points of the pattern are being edited: moved, pinned and settled, their sizes fixed."""
         count = settings.id_data.data.total_vert_sel
         text = f"{count:,} feature{'s' if count != 1 else ''} selected" if count else "Select features"
         layout.label(text=text, icon='VERTEXSEL')
-        large(layout).operator("bubble_pattern.fix_sizes", icon='PINNED')
-        layout.operator("bubble_pattern.free_sizes", icon='UNPINNED')
+        large(layout).operator("bubble_pattern.settle", icon='MOD_SMOOTH')
+        row = layout.row(align=True)
+        row.operator("bubble_pattern.pin", icon='PINNED')
+        row.operator("bubble_pattern.unpin", icon='UNPINNED')
+        row = layout.row(align=True)
+        row.operator("bubble_pattern.fix_sizes", icon='LOCKED')
+        row.operator("bubble_pattern.free_sizes", icon='UNLOCKED')
 
     def draw_applied(
         self, context: bpy.types.Context, layout: bpy.types.UILayout, obj: bpy.types.Object
@@ -113,6 +125,7 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
         else:
             layout.label(text=f"{nouns(settings.kind.lower(), settings.count)}, watertight", icon='CHECKMARK')
         large(layout).operator("bubble_pattern.edit", icon='GREASEPENCIL')
+        draw_files(layout)
         layout.operator("bubble_pattern.remove", icon='TRASH')
 
 

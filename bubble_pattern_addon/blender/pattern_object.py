@@ -13,6 +13,7 @@ from ..core.mesh import Floats, Ints, Mesh
 from ..core.metric import Places
 from ..core.pattern import Pattern, aimed, all_bubbles, split, take
 from .attributes import read_values, write_values
+from .point_marks import mark_pins, remember
 from .preview_nodes import show_shape
 from .reading import Base
 
@@ -44,6 +45,8 @@ def write_pattern(obj: bpy.types.Object, pattern: Pattern, base_object: bpy.type
     write_values(mesh, "triangle", 'POINT', 'INT', bubbles.places.triangle)
     write_values(mesh, "barycentric", 'POINT', 'FLOAT_VECTOR', bubbles.places.barycentric)
     write_sizes(obj, pattern)
+    mark_pins(obj, bubbles.position, bubbles.pitch)
+    remember(obj, bubbles.position, bubbles.ids)
     mesh.update()
     obj.matrix_parent_inverse = base_object.matrix_world.inverted_safe()
     obj.matrix_basis = Matrix(base.frame.tolist())
@@ -111,11 +114,14 @@ def point_ids(obj: bpy.types.Object) -> Ints:
 def read_pattern(obj: bpy.types.Object, mesh: Mesh) -> Pattern:
     """The pattern that the object's points carry, for the base geometry `mesh` it was made on.
 
-    Points that the user has deleted by hand are left out, and copies made by hand. Positions are taken from
+    Points that the user has deleted by hand are left out, and those made by hand. Positions are taken from
     the places on the base, which holds them on the surface to the last bit.
     """
     points = obj.data.attributes
-    ids, chosen = np.unique(point_ids(obj), return_index=True)
+    ids = point_ids(obj)
+    made = np.flatnonzero(read_values(points["pitch"].data, "value", np.float32) > 0)
+    ids, chosen = np.unique(ids[made], return_index=True)
+    chosen = made[chosen]
 
     def values(name: str, prop: str, dtype: type, width: int = 1) -> Floats:
         """Attribute `name` of the points in the order of ids, (n,), or (n, width) where that is above 1."""

@@ -10,8 +10,9 @@ from bpy.props import BoolProperty, PointerProperty
 
 from .feature_properties import FeatureSettings
 from .field_properties import BubblePatternField
+from .keep_out_properties import BubblePatternKeepOut
 from .limit_properties import LimitSettings
-from .packing_properties import PackingSettings
+from .packing_properties import BubblePatternPin, PackingSettings
 from .reacting import redraw_preview, show_cut
 from .region_properties import RegionSettings
 from .result_properties import BubblePatternBroken, ResultSettings
@@ -106,7 +107,14 @@ def pattern_of(obj: bpy.types.Object | None) -> bpy.types.Object | None:
     return on_base[0] if on_base else None
 
 
-CLASSES = (BubblePatternField, BubblePatternSeed, BubblePatternBroken, BubblePatternSettings)
+CLASSES = (
+    BubblePatternField,
+    BubblePatternKeepOut,
+    BubblePatternPin,
+    BubblePatternSeed,
+    BubblePatternBroken,
+    BubblePatternSettings,
+)
 _register, _unregister = bpy.utils.register_classes_factory(CLASSES)
 
 

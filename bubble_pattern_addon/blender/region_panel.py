@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from .keep_outs import BUBBLE_PATTERN_PT_keep_out
 from .sidebar import SettingsPanel, columns, shown_settings
 
 
@@ -22,4 +23,4 @@ class BUBBLE_PATTERN_PT_region(SettingsPanel, bpy.types.Panel):
             column.prop(settings, "gap")
 
 
-CLASSES = (BUBBLE_PATTERN_PT_region,)
+CLASSES = (BUBBLE_PATTERN_PT_region, BUBBLE_PATTERN_PT_keep_out)

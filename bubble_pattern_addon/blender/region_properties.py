@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
-from bpy.props import StringProperty
+from bpy.props import CollectionProperty, IntProperty, StringProperty
 
 from .field_properties import length_property
+from .keep_out_properties import BubblePatternKeepOut
 from .reacting import repack
 
 
@@ -27,4 +28,12 @@ class RegionSettings:
         default=0.0,
         min=0.0,
         update=repack,
+    )
+    keep_out: CollectionProperty(
+        name="Keep-Outs",
+        description="What the pattern goes round: screw bosses, a logo",
+        type=BubblePatternKeepOut,
+    )
+    active_keep_out: IntProperty(
+        name="Active Keep-Out", description="The keep-out whose settings are shown", min=0
     )

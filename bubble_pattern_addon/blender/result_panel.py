@@ -9,8 +9,12 @@ import bpy
 from ..core.density import mass
 from ..core.units import millimetres_in
 from .making_recipe import scene_unit
+from .recipe_operators import draw_files
 from .settings_recipe import is_outdated, length_text
 from .sidebar import SettingsPanel, columns, sentences, shown_settings
+
+# More nominal sizes than this are only counted.
+MOST_ROWS = 10
 
 
 class Figure(NamedTuple):
@@ -56,6 +60,7 @@ class BUBBLE_PATTERN_PT_result(SettingsPanel, bpy.types.Panel):
             go = row.operator("bubble_pattern.select_offending", text="", icon='VIEWZOOM')
             go.rule = 'SMALLEST_WEB'
         columns(layout).prop(settings, "density", text="Density (g/cm³)")
+        draw_files(layout)
         if settings.notes:
             sentences(layout, settings.notes, context.region.width, 'INFO')
 
@@ -99,9 +104,13 @@ def size_figures(context: bpy.types.Context, settings: Any) -> list[Figure]:
 
 
 def nominal_rows(context: bpy.types.Context, settings: Any) -> list[tuple[str, str]]:
-    """How many features have which nominal diameter, the largest at the end."""
+    """How many features have which nominal diameter, the largest at the end; where that is a long list, only
+    how many diameters there are.
+    """
     entries = [entry.split(",") for entry in settings.nominal.split(";") if entry]
-    return [(length_text(context, float(size)), f"{int(count):,}") for size, count in entries]
+    if len(entries) > MOST_ROWS:
+        return [("Sizes", f"{len(entries)}")]
+    return [(f"Size {length_text(context, float(size))}", f"{int(count):,}") for size, count in entries]
 
 
 def removed_figures(context: bpy.types.Context, settings: Any) -> list[Figure]:

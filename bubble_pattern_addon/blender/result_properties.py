@@ -35,11 +35,13 @@ class ResultSettings:
     """What came out of the last generation. -1 where nothing could be measured."""
 
     made_with: StringProperty(options={'HIDDEN'})
+    laid: StringProperty(options={'HIDDEN'})
     fingerprint: StringProperty(options={'HIDDEN'})
     size_trace: StringProperty(options={'HIDDEN'})
     trouble: StringProperty(options={'HIDDEN'})
     cut_trouble: StringProperty(options={'HIDDEN'})
     version: IntProperty(options={'HIDDEN'})
+    hand_made: BoolProperty(options={'HIDDEN'})
     seconds: FloatProperty(options={'HIDDEN'})
     count: IntProperty(name="Features", description="Number of features", options={'HIDDEN'})
     shrunk: IntProperty(options={'HIDDEN'})

@@ -16,21 +16,29 @@ from ..core.progress import Progress, Steps
 
 
 class Run:
-    """Some work under way. `latest` is its latest step; `result` what it returned, once it has `ended`."""
+    """Some work under way, on the object with the number `about`. `latest` is its latest step; `result` what
+    it returned, once it has `ended`; `changed_at` when a setting has changed that it did not know of.
+    """
 
-    def __init__(self, steps: Steps[Any]) -> None:
+    def __init__(self, steps: Steps[Any], about: int = 0) -> None:
+        self.about = about
+        self.renew(steps)
+
+    def renew(self, steps: Steps[Any]) -> None:
+        """Begin again with other steps; those before must have been closed."""
         self.steps = steps
         self.latest = Progress("Working", 0.0)
         self.result: Any = None
         self.ended = False
+        self.changed_at: float | None = None
 
     @property
     def open(self) -> bool:
-        """Whether there is more to do; neither ended nor stopped."""
+        """Whether nobody has stopped it."""
         return _under_way[0] is self
 
     def advance(self, seconds: float) -> None:
-        """Take steps for `seconds`, at least one. What a step raises ends the run."""
+        """Take steps for `seconds`, at least one. Raises what a step raises."""
         until = time.perf_counter() + seconds
         try:
             while True:
@@ -39,28 +47,21 @@ class Run:
                     return
         except StopIteration as end:
             self.result, self.ended = end.value, True
-            self._over()
-        except BaseException:
-            self._over()
-            raise
 
     def stop(self) -> None:
-        """Give the work up between two steps; closing the generator undoes what it began."""
-        self._over()
-        self.steps.close()
-
-    def _over(self) -> None:
+        """End it; work that has not ended is given up, and closing its generator undoes what it began."""
         if self.open:
             _under_way[0] = None
+        self.steps.close()
 
 
 _under_way: list[Run | None] = [None]
 
 
-def begin(steps: Steps[Any]) -> Run:
+def begin(steps: Steps[Any], about: int = 0) -> Run:
     """Begin a run; another one under way is stopped."""
     stop()
-    run = Run(steps)
+    run = Run(steps, about)
     _under_way[0] = run
     return run
 

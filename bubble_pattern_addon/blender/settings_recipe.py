@@ -10,6 +10,7 @@ import bpy
 
 from ..core.blending import Fill
 from ..core.errors import PatternError, RecipeError
+from ..core.keep_out_checks import check_keep_outs
 from ..core.metric import Constant, Described
 from ..core.recipe import Packing, Recipe, RegionChoice, Seed, Shaping
 from ..core.recipe_checks import check_recipe
@@ -17,6 +18,7 @@ from ..core.recipe_file import recipe_to_toml
 from .feature_settings import feature_of, placing, take_feature
 from .field_properties import point_of, typed
 from .field_recipe import described, take
+from .keep_out_properties import is_given, keep_out_of, take_keep_out
 from .making_recipe import limits_of, output_of, shaping_output, sizes_of, take_limits, take_sizes
 from .properties import BubblePatternSettings
 
@@ -28,6 +30,7 @@ def recipe_of(settings: Any) -> Recipe:
             attribute=settings.region or None,
             parts=(parts := tuple(name.strip() for name in settings.parts.split(",") if name.strip())),
             gap=typed(settings.gap) if parts else 0.0,
+            keep_out=tuple(keep_out_of(entry) for entry in settings.keep_out if is_given(entry)),
         ),
         packing=Packing(
             pitch=described(settings.pitch_field, settings.pitch, False, "[packing] pitch"),
@@ -43,6 +46,7 @@ def recipe_of(settings: Any) -> Recipe:
             seed=settings.seed,
             iterations=settings.iterations,
             tolerance=typed(settings.tolerance),
+            pins=tuple(point_of(pin.at) for pin in settings.pins),
         ),
         shaping=Shaping(
             diameter=diameter_of(settings),
@@ -56,6 +60,7 @@ def recipe_of(settings: Any) -> Recipe:
         limits=limits_of(settings),
         output=output_of(settings),
     )
+    check_keep_outs(recipe.region)
     check_recipe(recipe)
     return recipe
 
@@ -72,6 +77,9 @@ def take_recipe(settings: Any, recipe: Recipe) -> None:
     live, settings.live = settings.live, False  # one change after the other would lay a pattern each time
     settings.parts = ", ".join(recipe.region.parts)
     settings.gap = recipe.region.gap
+    settings.keep_out.clear()
+    for keep_out in recipe.region.keep_out:
+        take_keep_out(settings.keep_out.add(), keep_out)
     take_packing(settings, recipe.packing)
     take_shaping(settings, recipe.shaping)
     take_feature(settings, recipe.feature)
@@ -118,6 +126,9 @@ def take_packing(settings: Any, packing: Packing) -> None:
     settings.seed = packing.seed
     settings.iterations = packing.iterations
     settings.tolerance = packing.tolerance
+    settings.pins.clear()
+    for pin in packing.pins:
+        settings.pins.add().at = pin
 
 
 def take_shaping(settings: Any, shaping: Shaping) -> None:

@@ -14,13 +14,14 @@ import bpy
 
 from ..core.errors import BaseError
 from ..core.field_tables import Wanted
-from ..core.mesh import Bools
+from ..core.mesh import Bools, Ints
 from ..core.recipe import Recipe, RegionChoice
 from ..core.recipe_names import both, packing_names, shaping_names
 from ..core.region import Region, make_region
 from ..core.selection import select, sub_regions
 from ..core.surroundings import Surroundings
 from .cut_preview import hide_cut
+from .keep_outs import cut_to_choice
 from .marked_side import on_marked_side
 from .reading import Base, evaluated_mesh, read_base, shown
 from .surroundings import images_of, read_painted, trace, with_things
@@ -52,6 +53,7 @@ class Reading(NamedTuple):
     selected: Bools
     painted: Surroundings
     fingerprint: str
+    parts: Ints | None
 
 
 _remembered: OrderedDict[Any, tuple[Stamp, Reading]] = OrderedDict()
@@ -71,7 +73,9 @@ def read_source(
     pitch_names, size_names = (Wanted(), Wanted()) if recipe is None else names_of(recipe)
     names = both(pitch_names, size_names)
     choice = RegionChoice(attribute=attribute) if recipe is None else recipe.region
-    reading = reading_of(obj, attribute, choice, names, context)
+    reading = reading_of(obj, attribute, replace(choice, keep_out=()), names, context)
+    if choice.keep_out:
+        reading = less_keep_outs(reading, choice, context)
     painted = replace(reading.painted, images=images_of(names.images))
     surroundings = with_things(painted, names, reading.base.frame, context)
     return Source(
@@ -126,4 +130,13 @@ def read(
     selected = on_marked_side(obj, base, attribute, selected)
     parts = sub_regions(choice, base.attributes, base.materials)
     region = make_region(base.mesh, selected, parts, choice.gap)
-    return Reading(base, region, selected, painted, base.fingerprint(selected, parts))
+    return Reading(base, region, selected, painted, base.fingerprint(selected, parts), parts)
+
+
+def less_keep_outs(reading: Reading, choice: RegionChoice, context: bpy.types.Context) -> Reading:
+    """The reading with what the choice keeps out cut out of its region; what that is counts for the
+    fingerprint.
+    """
+    base, selected, parts = reading.base, reading.selected, reading.parts
+    region, trace = cut_to_choice(base, selected, parts, choice, reading.fingerprint, context)
+    return reading._replace(region=region, fingerprint=reading.fingerprint + trace)

@@ -13,10 +13,13 @@ from ..core.progress import Steps, drive
 from . import runs
 from .settings_recipe import spoken
 
-# So long Blender may stand still between two looks at the mouse, in seconds.
-SLICE = 0.06
+# So long Blender may stand still between two looks at the mouse, in seconds: where drawing takes longer than
+# the first, as long as it takes, or the work would hardly go on.
+SLICE, LONGEST_SLICE = 0.06, 0.3
 # Work that ends within this time never becomes modal: the redo panel works, and nothing flickers.
 PATIENCE = 0.4
+# Work on settings that change begins again when none has changed for so long, in seconds.
+REST = 0.1
 # Bubbles are drawn anew no sooner than after this time, in seconds.
 FRAME = 0.1
 # What turns, moves and zooms the view, and what only looks.
@@ -82,6 +85,10 @@ class SteppedOperator:
     def done(self, context: bpy.types.Context, result: Any) -> None:
         """Tell the user what came out."""
 
+    def about(self, context: bpy.types.Context) -> int:
+        """Number of the object whose settings the work goes by."""
+        return 0
+
     def stands(self, context: bpy.types.Context) -> bool:
         """Whether what the work is about is still there, as it was when the work began."""
         return True
@@ -98,15 +105,19 @@ class SteppedOperator:
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         """Work with progress in the status bar; Esc or a right click cancels."""
-        self._run = runs.begin(self.steps(context))
+        self._run = runs.begin(self.steps(context), self.about(context))
         outcome = self.advance(context, PATIENCE)
         if outcome is not None:
+            self._run.stop()
             return outcome
         manager = context.window_manager
         self._timer = manager.event_timer_add(0.01, window=context.window)
         self._drawing: Any = None
         self._drawn = 0.0
+        self._worked = time.perf_counter()
         self._mode = context.mode
+        self._outcome: set[str] | None = None
+        self._moved = False
         context.workspace.status_text_set(status_of(self._run))
         manager.modal_handler_add(self)
         return {'RUNNING_MODAL'}
@@ -115,21 +126,51 @@ class SteppedOperator:
         """Work on at every tick of the timer. Meanwhile the view can be turned, and nothing be edited."""
         if not self._run.open:
             return self.give_up(context, "Cancelled")
+        if self._outcome is not None and self._run.changed_at is None and self.is_let_go(event):
+            self.cancel(context)
+            return {*self._outcome, 'PASS_THROUGH'}
         if event.type in {'ESC', 'RIGHTMOUSE'} and event.value == 'PRESS':
             return self.give_up(context, "Cancelled")
         if event.type == 'TIMER':
             if context.mode != self._mode or not self.stands(context):
                 return self.give_up(context, "Cancelled: what it was about has changed meanwhile")
-            outcome = self.advance(context, SLICE)
-            if outcome is not None:
-                self.tidy(context)
-                return outcome
-            self.show(context)
+            self.tick(context)
         # A button let go is no edit, and the slider that is being dragged waits for it.
         if event.type in NAVIGATION or event.value == 'RELEASE':
             return {'PASS_THROUGH'}
         over_sidebar = self.heeds_sidebar and is_over_sidebar(context, event)
         return {'PASS_THROUGH'} if over_sidebar else {'RUNNING_MODAL'}
+
+    def tick(self, context: bpy.types.Context) -> None:
+        """Work on for a while; from the beginning where settings have changed and the mouse rests."""
+        changed_at = self._run.changed_at
+        if changed_at is not None:
+            self._run.steps.close()
+            if time.perf_counter() - changed_at < REST:
+                return
+            self._run.renew(self.steps(context))
+            self._outcome = None
+        if self._outcome is None:
+            others = time.perf_counter() - self._worked
+            self._outcome = self.advance(context, min(max(SLICE, others), LONGEST_SLICE))
+            self._moved = not self.may_be_dragged()
+            self.show(context)
+            self._worked = time.perf_counter()
+
+    def is_let_go(self, event: bpy.types.Event) -> bool:
+        """Whether no slider is being dragged any more, for all that the events tell.
+
+        The end of a modal operator sets the mouse back to where the slider was grasped, and the slider with
+        it. A mouse that moves and changes no setting does not drag; nor does one of which a button is let go.
+        """
+        if event.type in {'MOUSEMOVE', 'INBETWEEN_MOUSEMOVE'}:
+            self._moved = True  # the slider hears of it next, and the setting changes before the timer's tick
+            return False
+        return self._moved if event.type == 'TIMER' else event.type not in NAVIGATION
+
+    def may_be_dragged(self) -> bool:
+        """Whether the operator was set off by a slider that the mouse may still hold."""
+        return False
 
     def give_up(self, context: bpy.types.Context, why: str) -> set[str]:
         """End without a result."""
@@ -149,8 +190,7 @@ class SteppedOperator:
         except PatternError as error:
             return self.refuse(error, context)
         except BaseException:
-            if hasattr(self, "_timer"):
-                self.tidy(context)
+            self.cancel(context)
             raise
         if not self._run.ended:
             return None

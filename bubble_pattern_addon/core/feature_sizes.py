@@ -11,6 +11,7 @@ from .feature_recipe import ASPECTS, BUMP_HEIGHT, DIMPLE_DEPTH, RIM_SIZE, Featur
 from .mesh import Floats, Ints
 from .metric import Described
 from .pattern import Pattern
+from .profile import outlines
 
 FEWEST_SIDES = 12
 DEFAULT_SIDES = 32
@@ -61,6 +62,18 @@ def depths(feature: Feature, pattern: Pattern) -> Floats:
     if feature.kind == "bump":
         return np.zeros(len(pattern))
     return feature_sizes(feature, pattern).depth
+
+
+def narrowness(feature: Feature, pattern: Pattern) -> Floats:
+    """Width of the features where they are narrowest, relative to their diameters, (n,): of a slot its width,
+    of a cross that of its bars. A mesh counts as its circle.
+    """
+    if feature.profile in ("circle", "mesh"):
+        return np.ones(len(pattern))
+    aspect = feature_sizes(feature, pattern).aspect
+    kinds, which = np.unique(aspect, return_inverse=True)
+    room = outlines(feature, np.full(len(kinds), 2.0), kinds, DEFAULT_SIDES).room
+    return np.broadcast_to(room, len(kinds))[which.reshape(-1)]
 
 
 def _size(feature: Feature, pattern: Pattern, key: str, default: float | Floats) -> Floats:

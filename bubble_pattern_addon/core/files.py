@@ -5,10 +5,11 @@ from __future__ import annotations
 import contextlib
 import errno
 import io
+import os
 import re
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -20,11 +21,13 @@ from .errors import BaseError, OutputError
 from .mesh import Bools, Floats, Mesh
 from .paint import painted
 from .region import weld
-from .surroundings import Thing
+from .surroundings import Solid, Solids, Thing
 from .threemf import Piece, read_3mf, write_3mf
 
 SUFFIXES = (".stl", ".obj", ".ply", ".3mf", ".glb", ".gltf")
 SHOWN = "STL, OBJ, PLY, 3MF or GLB"
+# glTF measures in metres.
+METRE = 1000.0
 
 
 @dataclass(frozen=True)
@@ -35,7 +38,8 @@ class LoadedBase:
     attributes, materials: name -> mask (T,) of the triangles that carry it
     values: name -> what is painted on the base, (T,) on faces, (T, 3) or (T, 3, channels) at corners
     uv_maps: name -> (T, 3, 2)
-    objects: name -> what stands beside the base
+    objects: name -> what stands beside the base; solids: bodies there that keep-outs name
+    millimetres: how many of them its unit is long, None where the file does not say
     """
 
     mesh: Mesh
@@ -44,6 +48,8 @@ class LoadedBase:
     values: Mapping[str, Floats] = field(default_factory=dict, kw_only=True)
     uv_maps: Mapping[str, Floats] = field(default_factory=dict, kw_only=True)
     objects: Mapping[str, Thing] = field(default_factory=dict, kw_only=True)
+    solids: Solids = field(default_factory=dict, kw_only=True)
+    millimetres: float | None = field(default=None, kw_only=True)
 
 
 # -- in ------------------------------------------------------------------------------------------------------
@@ -61,7 +67,7 @@ def load_base(path: Path) -> LoadedBase:
     if path.suffix.lower() not in SUFFIXES:
         raise BaseError(f"Base {path.name} has a suffix that is not known: save it as {SHOWN}")
     try:
-        pieces = _read(path)
+        pieces, millimetres = _read(path)
     except OSError as error:
         raise BaseError(f"Base {path} can't be read: {error.strerror or error}") from None
     except Exception as error:  # whatever a parser does on a file that breaks its format's rules
@@ -78,10 +84,17 @@ def load_base(path: Path) -> LoadedBase:
     values = _laid_end_to_end([piece.values for piece in pieces], pieces)
     masks = {name: column != 0 for name, column in values.items() if column.ndim == 1}
     uv_maps = _laid_end_to_end([piece.uv_maps for piece in pieces], pieces)
-    return LoadedBase(weld(mesh), masks, materials, values=values, uv_maps=uv_maps)
+    return LoadedBase(weld(mesh), masks, materials, values=values, uv_maps=uv_maps, millimetres=millimetres)
 
 
-def _read(path: Path) -> list[Piece]:
+def load_solids(names: Iterable[str], folder: Path) -> Solids:
+    """The bodies in mesh files, named as seen from `folder`, upright. BaseError as load_base."""
+    upright = np.array([0.0, 0.0, 1.0])
+    return {("file", name): [Solid(load_base(folder / name).mesh, upright)] for name in sorted(set(names))}
+
+
+def _read(path: Path) -> tuple[list[Piece], float | None]:
+    """The pieces in a file, and how many millimetres its unit is long."""
     if path.suffix.lower() == ".3mf":
         return read_3mf(path)
     scene = _obj_scene(path) if path.suffix.lower() == ".obj" else trimesh.load_scene(path, process=False)
@@ -91,7 +104,7 @@ def _read(path: Path) -> list[Piece]:
         geometry = scene.geometry[geometry_name]
         if isinstance(geometry, trimesh.Trimesh):  # points and curves have no faces
             pieces.append(_placed(geometry, np.asarray(matrix, dtype=np.float64)))
-    return pieces
+    return pieces, METRE if path.suffix.lower() in (".glb", ".gltf") else None
 
 
 def _obj_scene(path: Path) -> trimesh.Scene:
@@ -157,13 +170,14 @@ def _check_numbers(mesh: Mesh, path: Path) -> None:
 # -- out -----------------------------------------------------------------------------------------------------
 
 
-def write_mesh(path: Path, mesh: Mesh) -> None:
-    """The mesh in the format of the path's suffix (one of SUFFIXES): STL is binary, 3MF says millimetres.
+def write_mesh(path: Path, mesh: Mesh, millimetres: float = 1.0) -> None:
+    """The mesh in the format of the path's suffix (one of SUFFIXES); STL is binary.
 
-    Coordinates are written as they are, in the unit of the base. OSError where the file can't be written.
+    Coordinates are written as they are, in the unit of the base; but in a 3MF, which says its unit, in
+    millimetres, `millimetres` for each. OSError where the file can't be written.
     """
     if path.suffix.lower() == ".3mf":
-        write_3mf(path, mesh, path.stem)
+        write_3mf(path, Mesh(mesh.vertices * millimetres, mesh.triangles), path.stem)
         return
     body = trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False)
     content: Any = body.export(file_type=path.suffix[1:].lower())
@@ -196,6 +210,38 @@ def output_folder(target: Path) -> Iterator[Path]:
         for folder in reversed(made):
             with contextlib.suppress(OSError):
                 folder.rmdir()
+
+
+@contextlib.contextmanager
+def output_file(target: Path) -> Iterator[Path]:
+    """A working file beside `target`, with its suffix, that takes its place only when all went well.
+
+    Raises OutputError for a target that can't be written.
+    """
+    work: Path | None = None
+    try:
+        if target.is_dir():
+            raise OutputError(f"Output {target} is a folder: give a file")
+        if not target.parent.is_dir():
+            raise OutputError(f"Folder {target.parent} does not exist: choose another one")
+        handle, name = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent)
+        os.close(handle)
+        work = Path(name)
+        yield work
+        # a file made for us alone is for all whom the folder lets see
+        work.chmod(0o666 & ~_umask())
+        work.replace(target)
+    except OSError as error:
+        raise _in_words(error, target) from None
+    finally:
+        if work is not None:
+            work.unlink(missing_ok=True)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
 
 
 def _make_folders(folder: Path) -> list[Path]:

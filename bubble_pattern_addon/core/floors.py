@@ -12,10 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .distance import boundary_distance
+from .feature_sizes import depths, narrowness
 from .mesh import Floats, Ints
 from .pattern import Pattern
 from .processes import PROCESSES
-from .recipe import Limits
+from .recipe import Limits, Recipe
 from .region import Region
 from .thickness import near_thickness
 from .webs import narrow_pairs
@@ -68,18 +69,27 @@ class Floors:
         return np.maximum(self.hole, self.slender)
 
 
+def floors_for(bubbles: Pattern, region: Region, recipe: Recipe) -> Floors:
+    """Floors of these bubbles with the features that the recipe puts there; see floors_of."""
+    feature = recipe.feature
+    depth, narrow = depths(feature, bubbles), narrowness(feature, bubbles)
+    return floors_of(bubbles, region, recipe.limits, depth, recipe.millimetre, narrow)
+
+
 def floors_of(
     bubbles: Pattern,
     region: Region,
     limits: Limits,
     depth: Floats | float | None = None,
     millimetre: float = 1.0,
+    narrow: Floats | float = 1.0,
 ) -> Floors:
     """Floors of these bubbles, whatever diameters they have; of the limits alone where the process shall only
     be checked.
 
     depth: how deep the features go, (n,) or one for all; nan or None: through the near wall; millimetre: in
-    the unit of the base
+    the unit of the base; narrow: a feature's width where it is narrowest relative to its diameter, (n,) or
+    one for all: a process makes a slot with a tool as wide as that
     """
     n = len(bubbles)
     lengths = (limits.min_diameter, limits.min_web, limits.min_margin)
@@ -92,8 +102,8 @@ def floors_of(
     given = np.broadcast_to(np.nan if depth is None else depth, n).astype(np.float64)
     deep = np.where(np.isnan(given), thickness / process.through, given / process.blind)
     return Floors(
-        np.fmax(hole, process.hole.at(thickness, millimetre)),
-        np.nan_to_num(deep),
+        np.fmax(hole, process.hole.at(thickness, millimetre) / narrow),
+        np.nan_to_num(deep) / narrow,
         np.fmax(web, process.web.at(thickness, millimetre)),
         np.fmax(margin, process.margin.at(thickness, millimetre)),
         int(np.isnan(thickness).sum()),

@@ -38,7 +38,8 @@ def limited(bubbles: Pattern, region: Region, limits: Limits) -> Pattern:
 def limited_by(bubbles: Pattern, region: Region, floors: Floors, sizes: Floats | None = None) -> Pattern:
     """The pattern with its diameters cut down to the floors, its too small features left out.
 
-    bubbles: with the diameters that the shaping metric asks for, which stay in `wished`
+    bubbles: with the diameters that the shaping metric asks for, which stay in `wished`, snapped to the
+    sizes where these are given
     sizes: (k,) rising, the only diameters there are: every feature gets the nearest smaller one, and one that
     would have to be smaller than all that its floors allow is left out
     """
@@ -51,7 +52,8 @@ def limited_by(bubbles: Pattern, region: Region, floors: Floors, sizes: Floats |
         partners = order[np.searchsorted(bubbles.ids, bubbles.partners, sorter=order)]
         diameter, kept = _alike(partners, wished, diameter, kept)
     if sizes is not None:
-        diameter = snapped(diameter, sizes)
+        diameter, nominal = snapped(diameter, sizes), snapped(wished, sizes)
+        wished = np.where(nominal > 0, nominal, wished)
     return split(replace(bubbles, diameter=np.where(kept, diameter, 0.0), wished=wished), kept)
 
 

@@ -10,7 +10,7 @@ from .mesh import Floats, Ints
 from .packing.force import find_pairs
 from .pattern import Pattern
 from .region import Region
-from .surface import Charts
+from .surface import Charts, on_region
 
 # Bubbles closer than this many stable distances are in neighbouring rows, or in the same.
 TOUCHING = 1.35
@@ -42,5 +42,5 @@ def find_links(charts: Charts, points: Floats, row: Ints, pitch: Floats) -> Link
 
 def links_of(pattern: Pattern, region: Region) -> Links:
     """Links between the features of a pattern on its region."""
-    row = np.searchsorted(region.triangles, pattern.places.triangle)
+    row = on_region(region, pattern.places).row
     return find_links(region.charts, pattern.position, row, pattern.pitch)

@@ -1,4 +1,4 @@
-"""A recipe seen from another frame: its points and directions after a rigid motion."""
+"""A recipe and a pattern seen from another frame: their points and directions after a rigid motion."""
 
 from __future__ import annotations
 
@@ -10,10 +10,12 @@ import numpy as np
 
 from .blending import FaceSet
 from .feature_recipe import Feature
+from .keep_out import frame_along
 from .mesh import Floats
-from .metric import Described
+from .metric import Described, Places
 from .painted import Image, mean_normal, upward
-from .recipe import Recipe
+from .pattern import Pattern
+from .recipe import KeepOut, Recipe
 from .region import Region
 from .toml_values import Point
 
@@ -28,16 +30,51 @@ def moved_recipe(recipe: Recipe, matrix: Floats, region: Region) -> Recipe:
     if np.array_equal(matrix, np.eye(4)):
         return recipe
     packing, shaping, choice = recipe.packing, recipe.shaping, recipe.region
-    orientation = packing.orientation
+    orientation, projection = packing.orientation, recipe.output.projection
     if not isinstance(orientation, str):
         orientation = _turned(orientation, matrix)
+    if not isinstance(projection, str):
+        projection = _turned(projection, matrix)
+    centre = packing.symmetry_centre
+    keep_outs = tuple(_moved_keep_out(keep_out, matrix) for keep_out in choice.keep_out)
+    near = None if choice.near is None else _moved_point(choice.near, matrix)
     seeds = tuple(replace(seed, at=_moved_point(seed.at, matrix)) for seed in shaping.seeds)
     return replace(
         recipe,
-        region=replace(choice, near=None if choice.near is None else _moved_point(choice.near, matrix)),
-        packing=replace(packing, pitch=moved(packing.pitch, matrix, region), orientation=orientation),
+        region=replace(choice, near=near, keep_out=keep_outs),
+        packing=replace(
+            packing,
+            pitch=moved(packing.pitch, matrix, region),
+            orientation=orientation,
+            symmetry_centre=None if centre is None else _moved_point(centre, matrix),
+            pins=tuple(_moved_point(pin, matrix) for pin in packing.pins),
+        ),
         shaping=replace(shaping, diameter=moved(shaping.diameter, matrix, region), seeds=seeds),
         feature=moved_feature(recipe.feature, matrix, region),
+        output=replace(recipe.output, projection=projection),
+    )
+
+
+def moved_pattern(pattern: Pattern, matrix: Floats, factor: float = 1.0) -> Pattern:
+    """`pattern` after the rigid motion `matrix` (4, 4), and then `factor` times as large."""
+    turn = matrix[:3, :3].T
+    places = pattern.places
+    position = (places.position @ turn + matrix[:3, 3]) * factor
+    return replace(
+        pattern,
+        places=Places(position, places.triangle, places.barycentric),
+        normal=pattern.normal @ turn,
+        tangent=pattern.tangent @ turn,
+        pitch=pattern.pitch * factor,
+        diameter=pattern.diameter * factor,
+        wished=None if pattern.wished is None else pattern.wished * factor,
+        axis=None if pattern.axis is None else pattern.axis @ turn,
+        heading=None if pattern.heading is None else pattern.heading @ turn,
+        sizes={
+            name: values * factor if name in ("depth", "height") else values
+            for name, values in pattern.sizes.items()
+        },
+        dropped=None if pattern.dropped is None else moved_pattern(pattern.dropped, matrix, factor),
     )
 
 
@@ -50,6 +87,24 @@ def moved_feature(feature: Feature, matrix: Floats, region: Region) -> Feature:
         turn_direction=None if heads is None else _turned(heads, matrix),
         turn_point=None if point is None else _moved_point(point, matrix),
     )
+
+
+def _moved_keep_out(keep_out: KeepOut, matrix: Floats) -> KeepOut:
+    """A keep-out after the motion; what the recipe leaves to its default is written out where that turns."""
+    found: dict[str, Point] = {}
+    for key in ("sphere", "cylinder", "box"):
+        at = getattr(keep_out, key)
+        if at is not None:
+            found[key] = _moved_point(at, matrix)
+    axis = keep_out.axis
+    if axis is None and (keep_out.cylinder or keep_out.box or keep_out.file):
+        axis = 0.0, 0.0, 1.0
+    if axis is not None:
+        found["axis"] = _turned(axis, matrix)
+    if keep_out.box is not None and axis is not None:
+        along = None if keep_out.along is None else np.array(keep_out.along)
+        found["along"] = _turned(_point(frame_along(np.array(axis), along)[0]), matrix)
+    return replace(keep_out, **found)  # type: ignore[arg-type]
 
 
 def moved(described: Described, matrix: Floats, region: Region) -> Described:
@@ -91,10 +146,13 @@ def _each(value: Any, change: Callable[[Point], Point]) -> Any:
 
 
 def _moved_point(point: Point, matrix: Floats) -> Point:
-    x, y, z = (matrix[:3, :3] @ np.array(point) + matrix[:3, 3]).tolist()
-    return x, y, z
+    return _point(matrix[:3, :3] @ np.array(point) + matrix[:3, 3])
 
 
 def _turned(vector: Point, matrix: Floats) -> Point:
-    x, y, z = (matrix[:3, :3] @ np.array(vector)).tolist()
+    return _point(matrix[:3, :3] @ np.array(vector))
+
+
+def _point(values: Floats) -> Point:
+    x, y, z = values.tolist()
     return x, y, z

@@ -27,7 +27,8 @@ class Pattern:
     pitch: (n,) packing metric at the bubble: the diameter of its territory
     diameter: (n,) size of the feature, from the shaping metric, within the limits
     row: (n,) 0 for the first row along a boundary, 1 for the next, ...
-    wished: (n,) the size that the shaping metric asked for; None where nothing is known of it
+    wished: (n,) the size that the shaping metric asked for, of nominal sizes the nearest smaller one; None
+    where nothing is known of it
     bubble: (n,) number of the feature's bubble, rising; None where every bubble has a feature
     dropped: the bubbles whose feature was left out as too small; None where none was
     notes: what a designer should know of the pattern, one sentence each

@@ -10,15 +10,16 @@ from scipy.sparse.csgraph import dijkstra
 
 from .errors import RegionError
 from .links import Links, find_links
-from .mesh import Floats, Ints
-from .metric import Bound, Constant, Field, Places
+from .mesh import Bools, Floats, Ints
+from .metric import Bound, Constant, Field
+from .packing.bubbles import Bubbles, Ground
 from .packing.pack import local_pitch, pack_steps
 from .pattern import Pattern
 from .progress import Progress, Steps
-from .recipe import Recipe, rounded
+from .recipe import Packing, Recipe, rounded
 from .region import Region
 from .shaping import bound, shaped
-from .surface import Charts, Spots, positions, smooth_normals, to_frame, to_space
+from .surface import Charts, Spots, on_base, smooth_normals, to_frame, to_space
 from .surroundings import NOTHING, Surroundings
 
 
@@ -30,20 +31,43 @@ def pattern_steps(region: Region, recipe: Recipe, surroundings: Surroundings = N
     Raises RegionError where the pitch does not suit the region, RecipeError where the diameter does not suit
     the pitch, FieldError where the surroundings lack what a field asks for.
     """
-    surroundings = replace(surroundings, region=region)
-    metric = bound(recipe.packing.pitch, surroundings, "[packing] pitch")
+    packing = bound_packing(region, recipe, surroundings)
+    ground, bubbles = yield from pack_steps(region, packing)
+    yield Progress("Shaping the features", 0.95)
+    first = np.arange(len(bubbles)) < bubbles.fixed - bubbles.inner
+    return laid(ground, bubbles, first, recipe, surroundings)
+
+
+def bound_packing(region: Region, recipe: Recipe, surroundings: Surroundings) -> Packing:
+    """The recipe's step 1 with the packing metric in its surroundings; for errors see pattern_steps."""
+    metric = bound(recipe.packing.pitch, replace(surroundings, region=region), "[packing] pitch")
     _check_lengths(region, metric, "pitch")
     # a number stays one: there are quick ways to pack with the same pitch everywhere
-    pitch_there = metric if isinstance(metric, Constant) else Bound(metric)
-    ground, bubbles = yield from pack_steps(region, replace(recipe.packing, pitch=pitch_there))
-    yield Progress("Shaping the features", 0.95)
-    spots = bubbles.spots
+    return replace(recipe.packing, pitch=metric if isinstance(metric, Constant) else Bound(metric))
+
+
+def laid(
+    ground: Ground,
+    bubbles: Bubbles,
+    first: Bools,
+    recipe: Recipe,
+    surroundings: Surroundings,
+    ids: Ints | None = None,
+    stretch: Floats | None = None,
+) -> Pattern:
+    """Pattern of the bubbles, those of the first row `first` (n,), shaped as the recipe says.
+
+    ids: (n,) other than their numbers, rising; stretch: (n,) how much larger than the packing metric they are
+    """
+    spots, region = bubbles.spots, ground.charts.region
     pitch = local_pitch(ground, bubbles)
     if bubbles.partners is not None:
         # Partners are alike also where the metric is so only within the tolerance.
         pitch = pitch[bubbles.partners].min(axis=1)
-    points = positions(ground.charts, spots)
-    places = Places(points, region.triangles[spots.row], spots.barycentric)
+    if stretch is not None:
+        pitch = pitch * stretch
+    places = on_base(region, spots)
+    points = places.position
     links = find_links(ground.charts, points, spots.row, pitch)
     normal = smooth_normals(region, spots)
     packed = Pattern(
@@ -52,18 +76,19 @@ def pattern_steps(region: Region, recipe: Recipe, surroundings: Surroundings = N
         tangent=_tangents(ground.charts, spots, points, links, normal),
         pitch=pitch,
         diameter=np.zeros(len(pitch)),
-        row=_rows(links, len(pitch), bubbles.fixed),
-        packing_notes=ground.notes,
+        row=_rows(links, first),
+        packing_notes=(*region.notes, *ground.notes),
         symmetry=None if ground.symmetry is None else ground.symmetry.group.word,
         partners=bubbles.partners,
+        bubble=ids,
     )
-    return shaped(packed, links, region, recipe, surroundings)
+    return shaped(packed, links, region, recipe, replace(surroundings, region=region))
 
 
 def _check_lengths(region: Region, field: Field, name: str) -> None:
     """RegionError where a field is no positive length at some corner of the region's triangles."""
     corners = np.tile(np.eye(3), (len(region.triangles), 1))
-    places = Places(region.corners.reshape(-1, 3), np.repeat(region.triangles, 3), corners)
+    places = on_base(region, Spots(np.repeat(np.arange(len(region.triangles)), 3), corners))
     values = field(places)
     bad = ~(np.isfinite(values) & (values > 0))
     if bad.any():
@@ -78,14 +103,15 @@ def _check_lengths(region: Region, field: Field, name: str) -> None:
         )
 
 
-def _rows(links: Links, n: int, first: int) -> Ints:
-    """Row of every bubble (n,): 0 for the `first` bubbles along the boundary, else the steps from there; -1
-    where no boundary can be reached.
+def _rows(links: Links, first: Bools) -> Ints:
+    """Row of every bubble (n,): 0 for those that are `first` (n,) along the boundary, else the steps from
+    there; -1 where no boundary can be reached.
     """
-    if not first:
+    n = len(first)
+    if not first.any():
         return np.full(n, -1)
     graph = coo_array((np.ones(len(links.first)), links[:2]), shape=(n, n)).tocsr()
-    steps = dijkstra(graph, directed=False, indices=np.arange(first), unweighted=True, min_only=True)
+    steps = dijkstra(graph, directed=False, indices=np.flatnonzero(first), unweighted=True, min_only=True)
     return np.where(np.isfinite(steps), steps, -1).astype(np.int64)
 
 

@@ -22,10 +22,40 @@ INTEGRATORS = ("fire", "rk4")
 ORIENTATIONS = ("edge", "best")
 SOLVERS = ("direct", "iterate")
 FORMATS = ("stl", "obj", "ply", "3mf", "glb")
+DRAWINGS = ("dxf", "svg")
+PROJECTIONS = ("flat", "normal")
+ALIGNMENTS = ("base", "rows")
 
 FILL = 0.6  # a feature's diameter relative to the pitch where the recipe gives only one of them
 FEATURES_WISHED = 500  # how many features a recipe that gives no length at all aims at
 NEAT = (1, 1.1, 1.2, 1.4, 1.6, 1.8, 2, 2.2, 2.5, 2.8, 3, 3.5, 4, 4.5, 5, 5.5, 6, 7, 8, 9, 10)
+
+
+@dataclass(frozen=True)
+class KeepOut:
+    """What the pattern goes round: faces (a face attribute or material), bodies or a shape (exactly one).
+
+    object, collection: of the .blend; file: a mesh file, seen from the recipe's folder
+    sphere, cylinder, box: its centre; the first two have a diameter, a box its size along its three axes
+    axis: the third axis of a cylinder or box, by default z; bodies are seen along it, by default along their
+    own Z axis; along: where the first axis of a box points, by default x or as near to it as can be
+    reach: how far along its axis beyond its own ends it counts; None: without end
+    margin: what stays free round it
+    """
+
+    faces: str | None = None
+    object: str | None = None
+    collection: str | None = None
+    file: str | None = None
+    sphere: Point | None = None
+    cylinder: Point | None = None
+    box: Point | None = None
+    diameter: float | None = None
+    size: Point | None = None
+    axis: Point | None = None
+    along: Point | None = None
+    reach: float | None = None
+    margin: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -34,6 +64,7 @@ class RegionChoice:
 
     parts: face attributes or materials whose faces are sub-regions with a first row of their own along their
     border (what none of them names is one more); gap: what stays free between neighbouring sub-regions
+    keep_out: what is taken out of it again (see core.keep_out)
     """
 
     near: Point | None = None
@@ -43,6 +74,7 @@ class RegionChoice:
     all: bool = False
     parts: tuple[str, ...] = ()
     gap: float = 0.0
+    keep_out: tuple[KeepOut, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -54,6 +86,7 @@ class Packing:
     symmetry: "off"; "auto", whichever the region has; "x", "xy" and so on, mirrored at planes square to these
     axes of the base; "rotate 3" or "rotate 3 z", turned into itself by thirds about an axis (see
     core.isometries); symmetry_centre: a point of the planes or the axis, None for the region's own middle
+    pins: where bubbles stay whatever becomes of the others
     """
 
     pitch: Described = Constant(3.0)
@@ -65,6 +98,7 @@ class Packing:
     tolerance: float = 1e-3
     symmetry: str = OFF
     symmetry_centre: Point | None = None
+    pins: tuple[Point, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -136,6 +170,8 @@ class Output:
     formats: the part in these formats too (see FORMATS); blend: the base with the editable pattern as
     pattern.blend; picture: a rendered view of the part as part.png
     density: of the part's material in g/cm3, for the mass of what is removed
+    drawings: of the pattern, in these formats (see DRAWINGS), as pattern.dxf and so on; projection, align:
+    how it is drawn, see drawing.make_drawing
     unit: that of the recipe's lengths (see core.units), and of the base where its file does not say; None:
     that of the base, or millimetres
     """
@@ -144,6 +180,9 @@ class Output:
     picture: bool = False
     formats: tuple[str, ...] = ()
     density: float | None = None
+    drawings: tuple[str, ...] = ()
+    projection: str | Point = "flat"
+    align: str = "base"
     unit: Unit | None = None
 
 

@@ -9,13 +9,17 @@ from .errors import RecipeError
 from .feature_checks import check_feature
 from .field_tables import asks_for_pitch
 from .isometries import check_symmetry
+from .keep_out_checks import check_keep_outs
 from .metric import Constant, Described
 from .nominal import check_sizes
 from .processes import PROCESSES
 from .recipe import (
+    ALIGNMENTS,
+    DRAWINGS,
     FORMATS,
     INTEGRATORS,
     ORIENTATIONS,
+    PROJECTIONS,
     SOLVERS,
     Limits,
     Output,
@@ -44,6 +48,7 @@ def check_choice(choice: RegionChoice) -> None:
     check_at_least(choice.gap, 0, "[region] gap")
     if choice.gap and not choice.parts:
         raise RecipeError("[region] gap goes between parts: name these too, or leave gap out")
+    check_keep_outs(choice)
 
 
 def check_recipe(recipe: Recipe) -> None:
@@ -67,11 +72,28 @@ def check_recipe(recipe: Recipe) -> None:
     check_symmetry(packing.symmetry, "[packing] symmetry")
     for coordinate in packing.symmetry_centre or ():
         check_finite(coordinate, "[packing] symmetry_centre")
+    for pin in packing.pins:
+        for coordinate in pin:
+            check_finite(coordinate, "[packing] pins")
     check_feature(recipe.feature, uniform_diameter(recipe))
     _check_limits(limits)
     _check_solve(recipe)
     _check_output(recipe.output)
     _check_room(recipe)
+
+
+def _check_output(output: Output) -> None:
+    if output.density is not None:
+        check_above(output.density, "[output] density")
+    for name in output.formats:
+        check_one_of(name, FORMATS, "[output] formats")
+    for name in output.drawings:
+        check_one_of(name, DRAWINGS, "[output] drawings")
+    if isinstance(output.projection, str):
+        check_one_of(output.projection, PROJECTIONS, "[output] projection")
+    elif not any(output.projection):
+        raise RecipeError("[output] projection = [0, 0, 0] is no direction: give one towards the viewer")
+    check_one_of(output.align, ALIGNMENTS, "[output] align")
 
 
 def _check_length(described: Described, where: str) -> None:
@@ -114,13 +136,6 @@ def _check_limits(limits: Limits) -> None:
         check_one_of(limits.process, tuple(PROCESSES), "[limits] process")
     if limits.thickness is not None:
         check_above(limits.thickness, "[limits] thickness")
-
-
-def _check_output(output: Output) -> None:
-    if output.density is not None:
-        check_above(output.density, "[output] density")
-    for name in output.formats:
-        check_one_of(name, FORMATS, "[output] formats")
 
 
 def _check_solve(recipe: Recipe) -> None:

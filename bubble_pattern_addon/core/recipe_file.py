@@ -14,9 +14,9 @@ from .feature_recipe import READERS as FEATURE_READERS
 from .field_tables import field_from_toml, field_to_toml
 from .metric import Constant, Described
 from .nominal import sizes_from_toml
-from .recipe import FILL, Recipe, Seed, rounded
+from .recipe import FILL, KeepOut, Recipe, Seed, rounded
 from .recipe_checks import check_choice, check_recipe
-from .toml_values import Point, flag, nearest, number, point, show, spell, text, texts, whole
+from .toml_values import Point, flag, nearest, number, point, points, show, spell, text, texts, whole
 from .units import read_unit
 
 
@@ -108,8 +108,12 @@ def _refuse_unknown(data: Mapping[str, Any]) -> None:
 # -- readers: the right type or a RecipeError that names the key ---------------------------------------------
 
 
-def _orientation(value: object, where: str) -> str | Point:
+def _word_or_vector(value: object, where: str) -> str | Point:
     return point(value, where) if isinstance(value, list) else text(value, where)
+
+
+def _points(value: object, where: str) -> tuple[Point, ...]:
+    return points(value, where) if value != [] else ()
 
 
 def _fill(value: object, where: str) -> Fill:
@@ -117,11 +121,31 @@ def _fill(value: object, where: str) -> Fill:
 
 
 def _seeds(value: object, where: str) -> tuple[Seed, ...]:
+    tables = _tables(value, where, "{ at = [x, y, z], diameter = 2.5 }")
+    return tuple(_seed(entry, f"{where}, seed {count}") for count, entry in enumerate(tables, 1))
+
+
+def _tables(value: object, where: str, example: str) -> list[Mapping[str, object]]:
     if not isinstance(value, list) or not all(isinstance(entry, Mapping) for entry in value):
-        raise RecipeError(
-            f"{where} = {show(value)} must be a list of tables: [{{ at = [x, y, z], diameter = 2.5 }}, ...]"
-        )
-    return tuple(_seed(entry, f"{where}, seed {count}") for count, entry in enumerate(value, 1))
+        raise RecipeError(f"{where} = {show(value)} must be a list of tables: [{example}, ...]")
+    return value
+
+
+def _keep_outs(value: object, where: str) -> tuple[KeepOut, ...]:
+    tables = _tables(value, where, "{ sphere = [x, y, z], diameter = 8.0, margin = 1.0 }")
+    return tuple(_keep_out(entry, f"{where}, entry {count}") for count, entry in enumerate(tables, 1))
+
+
+def _keep_out(table: Mapping[str, object], where: str) -> KeepOut:
+    readers: dict[str, Callable[[object, str], Any]] = (
+        dict.fromkeys(("faces", "object", "collection", "file"), text)
+        | dict.fromkeys(("sphere", "cylinder", "box", "size", "axis", "along"), point)
+        | dict.fromkeys(("diameter", "reach", "margin"), number)
+    )
+    for key in table:
+        if key not in readers:
+            raise RecipeError(f"{where} has no key {show(key)}: {nearest(key, readers)}")
+    return KeepOut(**{key: readers[key](entry, f"{where}: {key}") for key, entry in table.items()})
 
 
 def _seed(table: Mapping[str, object], where: str) -> Seed:
@@ -144,17 +168,19 @@ READERS: dict[str, dict[str, Callable[[object, str], Any]]] = {
         "all": flag,
         "parts": texts,
         "gap": number,
+        "keep_out": _keep_outs,
     },
     "packing": {
         "pitch": field_from_toml,
         "edge_offset": number,
-        "orientation": _orientation,
+        "orientation": _word_or_vector,
         "integrator": text,
         "seed": whole,
         "iterations": whole,
         "tolerance": number,
         "symmetry": text,
         "symmetry_centre": point,
+        "pins": _points,
     },
     "shaping": {
         "diameter": field_from_toml,
@@ -172,7 +198,16 @@ READERS: dict[str, dict[str, Callable[[object, str], Any]]] = {
         "check_only": flag,
     },
     "solve": {"open_area": number, "count": whole, "by": text},
-    "output": {"blend": flag, "picture": flag, "formats": texts, "density": number, "unit": read_unit},
+    "output": {
+        "blend": flag,
+        "picture": flag,
+        "formats": texts,
+        "density": number,
+        "drawings": texts,
+        "projection": _word_or_vector,
+        "align": text,
+        "unit": read_unit,
+    },
 }
 
 
@@ -205,4 +240,8 @@ def _line(key: str, value: object) -> str:
     if key == "seeds":
         assert isinstance(value, tuple)
         return f"seeds = {spell([{'at': seed.at, 'diameter': seed.diameter} for seed in value])}"
+    if key == "keep_out":
+        assert isinstance(value, tuple)
+        given = [{k: v for k, v in vars(entry).items() if v is not None} for entry in value]
+        return f"keep_out = {spell(given)}"
     return f"{key} = {spell(value)}"

@@ -31,17 +31,23 @@ class Region:
     """Target region on a base geometry.
 
     base: the whole base, vertices welded where they coincide exactly (triangles keep their rows)
-    triangles: (R,) rows of base.triangles that belong to the region, ascending
+    mesh: the region's own R triangles; they are the base's where no keep-out cuts these, else pieces of them
+    triangles: (R,) row of base.triangles that each is or lies in, ascending; pieces of one repeat it
+    within: (R, 3, 3) barycentric coordinates of each corner in that triangle of the base; None: all are whole
     neighbours: (R, 3) region row across the edge opposite to each corner, -1 at the boundary
     opposite: (R, 3) the corner of that neighbour which lies opposite to the shared edge
     sheet: (R,) label of the connected part a triangle belongs to
-    loops: boundary loops as rows of base vertices, the region on the left of each edge
+    loops: boundary loops as rows of mesh.vertices, the region on the left of each edge
     rim: (S, 2) every boundary edge as (region row, opposite corner), in the order of the loops
     reserve: (S,) what the first row keeps from each of these beyond its radius: half the gap between
     sub-regions on the borders that they share, else 0
+    part, gap: (R,) the sub-region of each triangle and what stays free between two of them; None: all is one
+    kept_out: area that keep-outs have taken from it; notes: what a designer should know of the region, one
+    sentence each
     """
 
     base: Mesh
+    mesh: Mesh
     triangles: Ints
     neighbours: Ints
     opposite: Ints
@@ -49,11 +55,16 @@ class Region:
     loops: tuple[Ints, ...]
     rim: Ints
     reserve: Floats
+    within: Floats | None = None
+    part: Ints | None = None
+    gap: float = 0.0
+    kept_out: float = 0.0
+    notes: tuple[str, ...] = ()
 
     @cached_property
     def corners(self) -> Floats:
         """Corner positions of the region's triangles, (R, 3, 3)."""
-        return self.base.vertices[self.base.triangles[self.triangles]]
+        return self.mesh.corners
 
     @cached_property
     def charts(self) -> Charts:
@@ -143,16 +154,36 @@ def make_region(base: Mesh, selected: Bools, parts: Ints | None = None, gap: flo
         raise RegionError("The target region is empty: select at least one face.")
     welded = weld(base)
     _check_geometry(welded, triangles)
-    rows = welded.triangles[triangles]
+    mesh = Mesh(welded.vertices, welded.triangles[triangles])
+    return region_of(welded, mesh, triangles, None if parts is None else parts[triangles], gap)
+
+
+def region_of(
+    base: Mesh, mesh: Mesh, triangles: Ints, part: Ints | None, gap: float, within: Floats | None = None
+) -> Region:
+    """The region whose own triangles are `mesh`; for the other arguments see Region."""
+    rows = mesh.triangles
     neighbours, opposite = _adjacency(rows)
     shared = np.zeros_like(neighbours, dtype=bool)
-    if parts is not None:
-        own = parts[triangles]
-        shared = (neighbours >= 0) & (own[neighbours] != own[:, None])
+    if part is not None:
+        shared = (neighbours >= 0) & (part[neighbours] != part[:, None])
         neighbours, opposite = np.where(shared, -1, neighbours), np.where(shared, -1, opposite)
-    loops, rim = _boundary_loops(rows, neighbours, opposite)
+    loops, rim = boundary_loops(rows, neighbours, opposite)
     reserve = np.where(shared[rim[:, 0], rim[:, 1]], gap / 2, 0.0)
-    return Region(welded, triangles, neighbours, opposite, _sheets(neighbours), loops, rim, reserve)
+    return Region(
+        base,
+        mesh,
+        triangles,
+        neighbours,
+        opposite,
+        _sheets(neighbours),
+        loops,
+        rim,
+        reserve,
+        within,
+        part,
+        gap,
+    )
 
 
 def weld(mesh: Mesh) -> Mesh:
@@ -217,7 +248,7 @@ def _sheets(neighbours: Ints) -> Ints:
     return connected_components(links, directed=False)[1].astype(np.int64)
 
 
-def _boundary_loops(rows: Ints, neighbours: Ints, opposite: Ints) -> tuple[tuple[Ints, ...], Ints]:
+def boundary_loops(rows: Ints, neighbours: Ints, opposite: Ints) -> tuple[tuple[Ints, ...], Ints]:
     """Boundary edges chained into loops: vertex rows per loop, and all edges as (row, opposite corner) in
     loop order.
     """

@@ -20,7 +20,7 @@ import numpy as np
 from .distance import boundary_distance
 from .feature_recipe import Feature
 from .feature_sizes import depths, feature_sizes
-from .floors import Broken, broken_rules, floors_of
+from .floors import Broken, broken_rules, floors_for
 from .mesh import Floats, Ints, digest
 from .pattern import Pattern, all_bubbles
 from .processes import PROCESSES
@@ -86,8 +86,8 @@ def results_of(pattern: Pattern, region: Region, recipe: Recipe, removed: float 
     bubbles = all_bubbles(pattern)
     kept = np.searchsorted(bubbles.ids, pattern.ids)
     deep = depths(recipe.feature, bubbles)
-    limits = replace(recipe.limits, check_only=False)
-    floors = floors_of(bubbles, region, limits, deep, recipe.millimetre).take(kept)
+    checked = replace(recipe, limits=replace(recipe.limits, check_only=False))
+    floors = floors_for(bubbles, region, checked).take(kept)
     if removed is None:
         removed = _estimated(pattern, region, recipe.feature, deep[kept])
     process = recipe.limits.process

@@ -63,6 +63,14 @@ def sub_regions(
     return np.where(np.any(masks, axis=0), np.argmax(masks, axis=0) + 1, 0)
 
 
+def face_set(name: str, known: Mapping[str, Bools]) -> Bools:
+    """The triangles (T,) with the face attribute or material of that name; there may be none. RegionError
+    where the name is not known.
+    """
+    kind = "face attribute or material"
+    return np.asarray(known[name], dtype=bool) if name in known else _named(name, known, kind)
+
+
 def _named(name: str, known: Mapping[str, Bools], kind: str) -> Bools:
     if name not in known:
         match = difflib.get_close_matches(name, list(known), 1, cutoff=0.5)

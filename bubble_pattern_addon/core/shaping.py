@@ -8,8 +8,7 @@ import numpy as np
 
 from .averaging import averaged
 from .errors import FieldError, RecipeError
-from .feature_sizes import depths
-from .floors import Floors, floors_of
+from .floors import Floors, floors_for
 from .heading import headed
 from .limits import limited_by
 from .links import Links, links_of
@@ -45,13 +44,12 @@ def shaped(
     surroundings = replace(surroundings, region=region)
     wished, notes = diameters(recipe.shaping, bubbles, links, surroundings)
     bubbles = headed(bubbles, links, recipe.feature, surroundings)
-    mm = recipe.millimetre
-    floors = floors_of(bubbles, region, recipe.limits, depths(recipe.feature, bubbles), mm)
+    floors = floors_for(bubbles, region, recipe)
     pattern = limited_by(
         replace(bubbles, diameter=wished, notes=(*bubbles.packing_notes, *notes, *floors.notes)),
         region,
         floors,
-        nominal_sizes(recipe.shaping.sizes, mm),
+        nominal_sizes(recipe.shaping.sizes, recipe.millimetre),
     )
     if len(bubbles) and not len(pattern):
         refuse_process(recipe, floors, wished)

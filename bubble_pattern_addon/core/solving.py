@@ -19,8 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .errors import RecipeError, RegionError
-from .feature_sizes import depths
-from .floors import floors_of
+from .floors import floors_for
 from .limits import limited_by
 from .mesh import Floats
 from .metric import Constant, Field, Places
@@ -100,16 +99,15 @@ def _by_diameter(region: Region, recipe: Recipe, surroundings: Surroundings) -> 
     packed = yield from within(pattern_steps(region, free, surroundings), 0.0, 0.8)
     bubbles = all_bubbles(packed)
     wished = bubbles.diameter if bubbles.wished is None else bubbles.wished
-    mm = recipe.millimetre
-    floors = floors_of(bubbles, region, recipe.limits, depths(recipe.feature, bubbles), mm)
-    sizes = nominal_sizes(recipe.shaping.sizes, mm)
+    floors = floors_for(bubbles, region, recipe)
+    sizes = nominal_sizes(recipe.shaping.sizes, recipe.millimetre)
 
     def open_at(factor: float) -> float:
         sized = replace(bubbles, diameter=wished * factor)
         return open_area(limited_by(sized, region, floors, sizes), region)
 
     yield Progress("Shaping to the open area", 0.8)
-    plain = float(np.pi / 4 * (wished**2).sum() / region.area)
+    plain = open_area(replace(bubbles, diameter=wished), region)
     trials = yield from within(
         _smallest_factor(open_at, target, plain, _largest_factor(recipe, bubbles.pitch, wished)), 0.8, 0.95
     )

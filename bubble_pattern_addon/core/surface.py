@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from .mesh import Bools, Floats, Ints
+from .metric import Places
 from .region import Region
 
 Complex = NDArray[np.complex128]
@@ -132,6 +133,31 @@ def make_charts(region: Region) -> Charts:
 def positions(charts: Charts, spots: Spots) -> Floats:
     """The places `spots` as points in space, (n, 3)."""
     return np.einsum("nk,nkc->nc", spots.barycentric, charts.region.corners[spots.row])
+
+
+def on_base(region: Region, spots: Spots) -> Places:
+    """The same places on triangles of the base, which keep-outs may have cut to pieces for the region."""
+    points = np.einsum("nk,nkc->nc", spots.barycentric, region.corners[spots.row])
+    if region.within is None:
+        return Places(points, region.triangles[spots.row], spots.barycentric)
+    inside = np.einsum("nk,nkc->nc", spots.barycentric, region.within[spots.row])
+    return Places(points, region.triangles[spots.row], inside)
+
+
+def on_region(region: Region, places: Places) -> Spots:
+    """Places on triangles of the base that are in the region, seen from the region's own ones."""
+    first = np.searchsorted(region.triangles, places.triangle)
+    if region.within is None:
+        return Spots(first, places.barycentric)
+    number = np.searchsorted(region.triangles, places.triangle, side="right") - first
+    owner = np.repeat(np.arange(len(first)), number)
+    piece = first[owner] + np.arange(len(owner)) - np.repeat(np.cumsum(number) - number, number)
+    # in the piece where the smallest coordinate is largest
+    inside = np.einsum("nk,nkc->nc", places.barycentric[owner], np.linalg.inv(region.within[piece]))
+    order = np.lexsort((piece, -inside.min(axis=1), owner))
+    best = order[np.cumsum(number) - number]
+    inside = np.maximum(inside[best], 0)
+    return Spots(piece[best], inside / inside.sum(axis=1, keepdims=True))
 
 
 def to_frame(charts: Charts, row: Ints, vectors: Floats) -> Complex:
@@ -320,7 +346,7 @@ def smooth_normals(region: Region, spots: Spots) -> Floats:
 
 def _corner_normals(region: Region, rows: Ints) -> Floats:
     """Unit normals (r, 3, 3) at the corners of the triangles `rows` (r,)."""
-    vertices = region.base.triangles[region.triangles].ravel()
+    vertices = region.mesh.triangles.ravel()
     order = np.argsort(vertices, kind="stable")
     count = np.bincount(vertices)
     start = np.cumsum(count) - count

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from .errors import FieldError
-from .mesh import Bools, Floats
+from .mesh import Bools, Floats, Mesh
 from .metric import Field
 from .toml_values import nearest, show
 
@@ -31,6 +31,18 @@ class Thing:
     points: Floats
     segments: Floats = field(default_factory=lambda: np.empty((0, 2, 3)))
     frame: Floats = field(default_factory=lambda: np.eye(4))
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A body beside the base, in the base's coordinates; axis: (3,) its own Z axis."""
+
+    mesh: Mesh
+    axis: Floats
+
+
+# Bodies that keep-outs name, by key and name: ("object", "Boss"), ("collection", "Bosses"), ("file", "a.stl")
+Solids = Mapping[tuple[str, str], Sequence[Solid]]
 
 
 @dataclass(frozen=True)

@@ -44,10 +44,16 @@ class _Model:
     objects: dict[str, ElementTree.Element]
     materials: dict[str, list[str]]
     build: list[ElementTree.Element]
+    unit: str
 
 
-def read_3mf(path: Path) -> list[Piece]:
-    """The pieces that the file's build section places, each where it is placed.
+# Units of the specification, in millimetres.
+UNITS = {"micron": 0.001, "millimeter": 1.0, "centimeter": 10.0, "inch": 25.4, "foot": 304.8, "meter": 1000.0}
+
+
+def read_3mf(path: Path) -> tuple[list[Piece], float]:
+    """The pieces that the file's build section places, each where it is placed, and how many millimetres its
+    unit is long.
 
     Raises whatever zipfile, ElementTree and KeyError say of a broken file; files.load_base puts it in words.
     """
@@ -79,7 +85,7 @@ def read_3mf(path: Path) -> list[Piece]:
                 pieces.append(_piece(body, mesh, matrix, model(name).materials))
             parents = parents | {here}
             stack += [(name, inner, matrix, parents) for inner in body.iter(f"{{{CORE}}}component")]
-    return pieces
+        return pieces, UNITS[model(start).unit]
 
 
 def _parse(text: bytes) -> _Model:
@@ -91,6 +97,7 @@ def _parse(text: bytes) -> _Model:
             for group in root.iter(f"{{{CORE}}}basematerials")
         },
         build=[item for build in root.iter(f"{{{CORE}}}build") for item in build.iter(f"{{{CORE}}}item")],
+        unit=root.get("unit", "millimeter"),
     )
 
 
@@ -126,7 +133,7 @@ def _material_name(materials: dict[str, list[str]], group: str, index: str) -> s
 
 
 def write_3mf(path: Path, mesh: Mesh, name: str = "part") -> None:
-    """One mesh as a 3MF file in millimetres, whatever its own unit. OSError where it can't be written."""
+    """One mesh, given in millimetres, as a 3MF file. OSError where it can't be written."""
     vertices = "".join(f'<vertex x="{x:.9g}" y="{y:.9g}" z="{z:.9g}"/>' for x, y, z in mesh.vertices.tolist())
     triangles = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in mesh.triangles.tolist())
     declaration = '<?xml version="1.0" encoding="UTF-8"?>\n'

@@ -715,7 +715,8 @@ def test_the_sidebar_shows_what_a_kind_needs() -> None:
     drawn = []
     main = SimpleNamespace(layout=Layout(drawn), draw_points=panels.BUBBLE_PATTERN_PT_main.draw_points)
     main.draw_points(main, main.layout, settings)
-    assert drawn == ["bubble_pattern.fix_sizes", "bubble_pattern.free_sizes"]
+    names = ("settle", "pin", "unpin", "fix_sizes", "free_sizes")
+    assert drawn == [f"bubble_pattern.{name}" for name in names]
 
 
 def test_names_and_tooltips_of_fields_are_as_blender_has_them() -> None:

@@ -497,7 +497,7 @@ def test_a_run_given_up_leaves_the_last_good_pattern(pattern: bpy.types.Object) 
     assert is_outdated(pattern.bubble_pattern)
 
 
-def test_a_run_that_fails_is_over() -> None:
+def test_a_run_that_fails_can_be_stopped() -> None:
     def failing() -> Iterator[Progress]:
         yield Progress("Working", 0.0)
         raise PatternError("no")
@@ -505,7 +505,9 @@ def test_a_run_that_fails_is_over() -> None:
     run = runs.begin(failing())
     with pytest.raises(PatternError):
         run.advance(1.0)
+    run.stop()
     assert runs.under_way() is None
+    assert not run.ended
 
 
 def test_operators_see_that_their_pattern_has_gone(pattern: bpy.types.Object) -> None:

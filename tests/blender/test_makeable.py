@@ -152,8 +152,11 @@ def test_nominal_sizes(pattern: bpy.types.Object) -> None:
     sizes = np.unique(np.round(points(pattern, "diameter") / MM, 5))
     assert sizes.tolist() == [1.0, 1.5, 2.0, 2.5, 3.0]
     rows = nominal_rows(bpy.context, settings)
-    assert [name for name, _ in rows] == ["1 mm", "1.5 mm", "2 mm", "2.5 mm", "3 mm"]
+    assert [name for name, _ in rows] == [f"Size {size} mm" for size in ("1", "1.5", "2", "2.5", "3")]
     assert sum(int(count) for _, count in rows) == settings.count
+    settings.sizes = 'DRILLS_01'
+    ((name, count),) = nominal_rows(bpy.context, settings)
+    assert (name, int(count)) == ("Sizes", len(np.unique(np.round(points(pattern, "diameter") / MM, 5))))
 
 
 def test_a_list_of_sizes_is_in_the_scenes_unit(pattern: bpy.types.Object) -> None:
@@ -198,7 +201,7 @@ def test_settings_and_recipe_are_the_same_thing(pattern: bpy.types.Object, syste
 # -- Solve For -------------------------------------------------------------------------------------------
 
 
-def test_the_diameter_is_found_for_an_open_area_and_undone_in_one_step(pattern: bpy.types.Object) -> None:
+def test_the_diameter_is_found_for_an_open_area(pattern: bpy.types.Object) -> None:
     settings = pattern.bubble_pattern
     settings.solve_open_area = 30.0
     places = points(pattern)
@@ -209,6 +212,24 @@ def test_the_diameter_is_found_for_an_open_area_and_undone_in_one_step(pattern: 
     assert np.allclose(points(pattern), places, atol=1e-7)
     assert not is_outdated(settings)
     assert settings.live
+
+
+def test_undo_takes_back_what_was_found_and_what_was_laid(pattern: bpy.types.Object) -> None:
+    name = pattern.name
+    settings = pattern.bubble_pattern
+    settings.solve_for, settings.solve_count = 'COUNT', 100
+    before = settings.count
+    bpy.ops.ed.undo_push(message="before")
+    assert bpy.ops.bubble_pattern.solve() == {'FINISHED'}
+    bpy.ops.ed.undo_push(message="Solve")
+    bpy.ops.ed.undo()
+    back = bpy.data.objects[name]
+    assert back.bubble_pattern.count == len(back.data.vertices) == before
+    assert back.bubble_pattern.pitch == pytest.approx(4 * MM)
+    bpy.ops.ed.redo()
+    again = bpy.data.objects[name]
+    assert abs(len(again.data.vertices) - 100) <= 1
+    assert not is_outdated(again.bubble_pattern)
 
 
 def test_the_pitch_is_found_for_a_count(pattern: bpy.types.Object) -> None:

@@ -21,6 +21,8 @@ def traces() -> dict[str, list[str]]:
         "object": list(bpy.types.Object.bl_rna.properties.keys()),
         "scene": list(bpy.types.Scene.bl_rna.properties.keys()),
         "window": list(bpy.types.WindowManager.bl_rna.properties.keys()),
+        "preset folders": bpy.utils.preset_paths("bubble_pattern"),
+        "export menu": [str(f) for f in bpy.types.TOPBAR_MT_file_export._dyn_ui_initialize()],
         "panels": [str(cls) for cls in bpy.types.Panel.__subclasses__() if hasattr(cls, "bl_rna")],
     }
     for name in dir(bpy.app.handlers):

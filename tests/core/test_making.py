@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -14,8 +15,9 @@ from hypothesis import strategies as st
 from bubble_pattern_addon.core.density import mass
 from bubble_pattern_addon.core.distance import boundary_distance
 from bubble_pattern_addon.core.errors import RecipeError
+from bubble_pattern_addon.core.feature_sizes import narrowness
 from bubble_pattern_addon.core.fields import Linear
-from bubble_pattern_addon.core.floors import broken_rules, floors_of
+from bubble_pattern_addon.core.floors import Floors, broken_rules, floors_of
 from bubble_pattern_addon.core.limits import limited_by
 from bubble_pattern_addon.core.metric import Constant
 from bubble_pattern_addon.core.nominal import SERIES, next_above, nominal_sizes, snapped
@@ -54,6 +56,11 @@ def millimetre(unit: Unit | None) -> float:
 def packed(region: Region, **recipe: object) -> Pattern:
     whole = Recipe(packing=Packing(pitch=Constant(PITCH)), shaping=Shaping(GRADED))
     return drive(pattern_steps(region, replace(whole, **recipe)))  # type: ignore[arg-type]
+
+
+@cache
+def graded() -> Pattern:
+    return packed(SHEET)
 
 
 def in_plane(points: list[tuple[float, float]], diameters: list[float]) -> Pattern:
@@ -136,12 +143,65 @@ def test_limits_that_ask_for_more_than_the_process_count(process: str) -> None:
     )
 
 
+@settings(max_examples=20, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 10_000), most=st.floats(0.5, 4.0))
+def test_floors_hold_at_every_feature_of_its_own(seed: int, most: float) -> None:
+    """As on a wall of varying thickness: of two neighbours the one that asks for more decides."""
+    bubbles, chance = graded(), np.random.default_rng(seed)
+    n = len(bubbles)
+    bubbles = replace(bubbles, diameter=chance.uniform(1.0, 7.0, n))
+    floors = Floors(*(chance.uniform(0.0, most, n) for _ in range(4)))
+    pattern = limited_by(bubbles, SHEET, floors)
+    kept = floors.take(np.searchsorted(bubbles.ids, pattern.ids))
+    gap = np.linalg.norm(pattern.position[:, None] - pattern.position[None], axis=2)
+    web = gap - (pattern.diameter[:, None] + pattern.diameter[None]) / 2 + 1e9 * np.eye(len(pattern))
+    assert (web >= np.maximum(kept.web[:, None], kept.web[None]) * (1 - 1e-9)).all()
+    margin = boundary_distance(pattern.position, SHEET.boundary_segments) - pattern.diameter / 2
+    assert (margin >= kept.margin * (1 - 1e-9)).all()
+    assert (pattern.diameter >= kept.diameter * (1 - 1e-6)).all()
+    assert not broken_rules(pattern, SHEET, kept)
+
+
 def test_a_deep_blind_feature_must_be_wide() -> None:
     pattern = in_plane([(0, 0)], [1.0])
     through = floors_of(pattern, SHEET, Limits(process="injection moulding", thickness=4.0))
     blind = floors_of(pattern, SHEET, Limits(process="injection moulding", thickness=4.0), depth=4.0)
     assert through.diameter.tolist() == [1.0]
     assert blind.diameter.tolist() == [2.0]
+
+
+@pytest.mark.parametrize(
+    ("profile", "narrow"),
+    [
+        (Feature(), 1.0),
+        (Feature(profile="slot", aspect=0.5), 0.5),
+        (Feature(profile="rectangle", aspect=0.75), 0.75 / 1.25),
+        (Feature(profile="cross", aspect=0.3), 0.3 / np.hypot(1.0, 0.3)),
+        (Feature(profile="polygon", corners=6), np.cos(np.pi / 6)),
+        (Feature(profile="slot", aspect=Linear(from_=0.25, to=0.25, direction=(1.0, 0.0, 0.0))), 0.25),
+    ],
+)
+def test_the_narrow_side_of_a_profile_goes_by_the_rule_for_holes(profile: Feature, narrow: float) -> None:
+    limits = Limits(process="punched sheet", thickness=1.15)
+    found = packed(SHEET, feature=profile, limits=limits)
+    assert narrowness(profile, found) == pytest.approx(narrow, rel=1e-3)
+    assert found.diameter.min() * narrow >= 1.15 * (1 - 1e-3)
+    assert not results_of(found, SHEET, Recipe(feature=profile, limits=limits)).broken
+    free = packed(SHEET, feature=profile)
+    assert free.diameter.min() * narrow < 1.15
+    assert "hole" in {b.rule for b in results_of(free, SHEET, Recipe(feature=profile, limits=limits)).broken}
+
+
+def test_enough_draft_keeps_the_rule(plate: Region) -> None:
+    for draft, broken in ((0.5, {"draft"}), (1.0, set())):
+        recipe = Recipe(
+            packing=Packing(pitch=Constant(PITCH)),
+            shaping=Shaping(Constant(3.0)),
+            feature=Feature(draft=draft),
+            limits=Limits(process="injection moulding"),
+        )
+        pattern = drive(pattern_steps(plate, recipe))
+        assert {one.rule for one in results_of(pattern, plate, recipe).broken} == broken
 
 
 def test_every_rule_tells_who_breaks_it_and_by_how_much() -> None:
@@ -224,7 +284,7 @@ def test_a_process_that_leaves_nothing_is_told_with_its_lengths() -> None:
     ),
 )
 def test_every_feature_is_the_nearest_smaller_nominal_size(sizes: list[float], limits: Limits) -> None:
-    bubbles = packed(SHEET)
+    bubbles = graded()
     wished = replace(bubbles, diameter=bubbles.wished)
     floors, allowed = floors_of(wished, SHEET, limits), np.unique(sizes)
     pattern = limited_by(wished, SHEET, floors, allowed)
@@ -240,6 +300,14 @@ def test_every_feature_is_the_nearest_smaller_nominal_size(sizes: list[float], l
     alike = np.isin(plain.ids, pattern.ids)
     if alike.sum() == kept.sum() and len(plain) == len(pattern):
         assert (next_size > plain.diameter).all()
+
+
+def test_what_is_only_snapped_was_not_made_smaller_by_limits() -> None:
+    free = packed(SHEET, shaping=Shaping(GRADED, sizes="drills 1"))
+    assert not len(free.shrunk)
+    tight = packed(SHEET, shaping=Shaping(GRADED, sizes="drills 1"), limits=Limits(min_web=1.5))
+    assert 0 < len(tight.shrunk) < len(tight)
+    assert tight.diameter.max() == 4.0
 
 
 def test_snapping_forgives_rounding_and_drops_what_is_too_small() -> None:

@@ -21,7 +21,7 @@ from bubble_pattern_addon.core.metric import Bound, Constant, Described, Places
 from bubble_pattern_addon.core.pipeline import pattern_steps
 from bubble_pattern_addon.core.progress import Progress, drive
 from bubble_pattern_addon.core.quality import open_area
-from bubble_pattern_addon.core.recipe import Limits, Packing, Recipe, Seed, Shaping, Solve
+from bubble_pattern_addon.core.recipe import Feature, Limits, Packing, Recipe, Seed, Shaping, Solve
 from bubble_pattern_addon.core.region import Region, make_region
 from bubble_pattern_addon.core.scaling import scaled
 from bubble_pattern_addon.core.solving import MOST_PACKINGS, TOLERANCE, Solved, solving_steps
@@ -92,6 +92,18 @@ def test_without_limits_the_second_shaping_is_the_pattern() -> None:
     found = solved(TRAPEZOID, recipe(Constant(3.0), solve=Solve(open_area=0.3)))
     assert found.shapings == 2
     assert found.reached == pytest.approx(0.3, rel=1e-5)
+
+
+@pytest.mark.parametrize("by", ["diameter", "pitch"])
+def test_slots_open_as_much_as_asked(by: str) -> None:
+    """Their own area counts, not that of the circles round them."""
+    asked = recipe(feature=Feature(profile="slot", aspect=0.5), solve=Solve(open_area=0.12, by=by))
+    found = solved(TRAPEZOID, asked)
+    again = drive(pattern_steps(TRAPEZOID, found.recipe))
+    assert again.share is not None
+    assert found.met
+    assert found.reached == pytest.approx(open_area(again, TRAPEZOID))
+    assert found.reached == pytest.approx(0.12, rel=1e-4 if by == "diameter" else 0.03)
 
 
 def test_seeds_grow_with_the_rest() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,11 +14,19 @@ from ..symmetry import Symmetry
 from .rim import Lengths, Track
 
 
+class Pins(NamedTuple):
+    """Bubbles that stay where the designer wants them: their n places, and which are of the first row."""
+
+    spots: Spots
+    on_track: Bools
+
+
 @dataclass(frozen=True)
 class Ground:
     """What bubbles are packed on: the surface, its boundary (None where there is none), the first row's
     track, the packing metric at places, its value where it is the same everywhere, and the edge offset; the
-    symmetry that the pattern shall have, or None, and what a designer should know of that.
+    symmetry that the pattern shall have, or None; the pins, or None; and what a designer should know of
+    these.
     """
 
     charts: Charts
@@ -27,13 +36,15 @@ class Ground:
     uniform: float | None
     edge_offset: float
     symmetry: Symmetry | None = None
+    pins: Pins | None = None
     notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Bubbles:
     """Places of n bubbles, of which the first `fixed` stay where they are: the first row along the boundary,
-    whose even spacing is what the eye sees first, and single rows in the middle of narrow places.
+    whose even spacing is what the eye sees first, single rows in the middle of narrow places, and pins, of
+    which the last `inner` are of no first row.
 
     In a symmetric pattern that is whole, partners (n, k) is the number of each bubble's image under each of
     the k isometries, the first of which leaves everything where it is, and orbit (n,) numbers those that are
@@ -44,6 +55,7 @@ class Bubbles:
     fixed: int = 0
     partners: Ints | None = None
     orbit: Ints | None = None
+    inner: int = 0
 
     def __len__(self) -> int:
         return len(self.spots.row)

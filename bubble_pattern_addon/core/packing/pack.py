@@ -8,21 +8,23 @@ import numpy as np
 
 from ..boundary import make_boundary, nearest_boundary, signature
 from ..errors import RegionError
+from ..isometries import OFF
 from ..mesh import Floats
-from ..metric import Constant, Field, Places
+from ..metric import Constant, Field
 from ..progress import Progress, Steps, within
 from ..quality import measure_points
 from ..recipe import Packing, rounded
 from ..region import Region
-from ..surface import Charts, Complex, Spots, positions, to_frame, walk
+from ..surface import Charts, Complex, Spots, on_base, positions, to_frame, walk
 from ..symmetry import find_symmetry
-from .bubbles import Bubbles, Ground, can_move, joined
+from .bubbles import Bubbles, Ground, Pins, can_move, joined
 from .crowding import close_pairs, uncrowded
 from .direction import smooth_directions
 from .force import STIFFNESS, stiff_law
 from .lattice import growing_steps
 from .narrows import in_the_narrows
 from .orbits import orbit_sizes, settled_leaders, symmetric_start, with_followers
+from .pins import PUSHED, check_apart, clear_of, on_surface, track_through, with_pins
 from .plane import fills_its_box, lay
 from .population import control, pressed_out
 from .relax import relax_steps
@@ -55,22 +57,50 @@ CRAMPED = 1.02
 # Rounds of relaxation and population control, and how many steps each may take; the last phases' steps.
 ROUNDS = 3
 STIFF_STEPS = 45
+NOT_SYMMETRIC = "The pattern is not symmetric: some of its features are placed by hand."
 
 
 def pack_steps(region: Region, packing: Packing) -> Steps[tuple[Ground, Bubbles]]:
     """Bubbles packed tightly in `region`. Raises RegionError where the pitch does not suit the region."""
     yield Progress("Reading the region", 0.0)
+    ground = ground_of(region, packing)
+    charts = ground.charts
+    if packing.pins:
+        ground = _pinned(ground, packing)
+    else:
+        finding = find_symmetry(
+            charts, ground.boundary, ground.pitch, packing.symmetry, packing.symmetry_centre
+        )
+        ground = replace(ground, symmetry=finding.symmetry, notes=finding.notes)
+    row = first_row(ground.track, loop_starts(ground))
+    along, between = in_the_narrows(ground, _without_conflicts(ground, row))
+    first = spots_on_track(charts, ground.track, along.arc) if len(along.arc) else _nobody()
+    fixed, inner = with_pins(ground, first, between)
+    ground, bubbles = yield from _filled(ground, fixed, packing)
+    return ground, replace(bubbles, inner=inner)
+
+
+def ground_of(region: Region, packing: Packing) -> Ground:
+    """What bubbles are packed on, without symmetry and pins. RegionError where the pitch does not suit."""
     charts = region.charts
     pitch = _pitch_over(region, packing.pitch)
     _check_count(region, pitch)
     uniform = packing.pitch.value if isinstance(packing.pitch, Constant) else None
-    ground = _ground(charts, pitch, uniform, packing.edge_offset)
-    finding = find_symmetry(charts, ground.boundary, pitch, packing.symmetry, packing.symmetry_centre)
-    ground = replace(ground, symmetry=finding.symmetry, notes=finding.notes)
-    row = first_row(ground.track, loop_starts(ground))
-    along, between = in_the_narrows(ground, _without_conflicts(ground, row))
-    first = spots_on_track(charts, ground.track, along.arc) if len(along.arc) else _nobody()
-    fixed = joined(first, between)
+    return _ground(charts, pitch, uniform, packing.edge_offset)
+
+
+def _pinned(ground: Ground, packing: Packing) -> Ground:
+    """The ground with the pins of the recipe, and the first row's track through those that are near it."""
+    pins = on_surface(ground.charts, np.array(packing.pins), ground.pitch, "pinned feature")
+    local = ground.pitch(pins)
+    check_apart(ground.charts, pins, local)
+    track, on_track = track_through(ground.track, ground.charts, pins, local)
+    notes = () if packing.symmetry == OFF else (NOT_SYMMETRIC,)
+    return replace(ground, track=track, pins=Pins(pins, on_track), notes=notes)
+
+
+def _filled(ground: Ground, fixed: Spots, packing: Packing) -> Steps[tuple[Ground, Bubbles]]:
+    """The bubbles that are `fixed`, and a lattice as the recipe wants it among them."""
     if packing.orientation == "best":
         return ground, (yield from _best_of_several(ground, fixed, packing))
     rows = packing.orientation if isinstance(packing.orientation, tuple) else None
@@ -109,6 +139,8 @@ def _settled(
     """Bubbles in balance: those that are `fixed`, and a lattice from `seeds` with rows along `directions`."""
     yield Progress("Growing the lattice", 0.1)
     lattice = yield from within(_lattice(ground, seeds, directions), 0.1, 0.2)
+    if ground.pins is not None:
+        lattice = clear_of(ground, lattice, ground.pins.spots, PUSHED)
     bubbles = Bubbles(joined(fixed, lattice), len(fixed.row))
     if ground.symmetry is not None:
         bubbles = symmetric_start(ground, bubbles)
@@ -124,7 +156,7 @@ def _settled(
         # At one pitch everywhere, whoever comes or goes after the first round stirs but a few neighbours.
         later = number > 0 and ground.uniform is not None
         steps = max(packing.iterations // (2 if later else 1), 1)
-        settling = settle(ground, bubbles, _filling(ground, bubbles, local), steps, packing.tolerance)
+        settling = settle(ground, bubbles, filling(ground, bubbles, local), steps, packing.tolerance)
         bubbles, _ = yield from within(settling, 0.2 + 0.2 * number, 0.4 + 0.2 * number)
         bubbles, changed = control(ground, bubbles, local)
         if not changed:
@@ -132,7 +164,7 @@ def _settled(
     yield Progress("Evening out the gaps", 0.8)
     while True:
         local = local_pitch(ground, bubbles)
-        size, stiffness = _filling(ground, bubbles, local), 1.0 + STIFFNESS
+        size, stiffness = filling(ground, bubbles, local), 1.0 + STIFFNESS
         evening = relax_steps(
             ground,
             bubbles,
@@ -154,7 +186,7 @@ def _settled(
     return bubbles
 
 
-def _filling(ground: Ground, bubbles: Bubbles, local: Floats) -> Floats:
+def filling(ground: Ground, bubbles: Bubbles, local: Floats) -> Floats:
     """The pitches (n,) at which n bubbles of the `local` ones fill a surface without a boundary.
 
     Nothing holds them together there: whoever is missing for a full arrangement would leave the others loose
@@ -174,8 +206,7 @@ def local_pitch(ground: Ground, bubbles: Bubbles) -> Floats:
 
 def _pitch_over(region: Region, field: Field) -> Lengths:
     def pitch(spots: Spots) -> Floats:
-        points = np.einsum("nk,nkc->nc", spots.barycentric, region.corners[spots.row])
-        return field(Places(points, region.triangles[spots.row], spots.barycentric))
+        return field(on_base(region, spots))
 
     return pitch
 

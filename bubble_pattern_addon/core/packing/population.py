@@ -65,6 +65,15 @@ def control(ground: Ground, bubbles: Bubbles, pitch: Floats) -> tuple[Bubbles, i
     return settled_leaders(ground, grown), int(gone.sum()) + len(added.row)
 
 
+def voids_among(ground: Ground, spots: Spots, pitch: Floats) -> Spots:
+    """Places for new bubbles in the voids among those at `spots`, of no symmetric pattern."""
+    points, row = positions(ground.charts, spots), spots.row
+    pairs = find_pairs(ground.charts, points, row, pitch, 0.0)
+    distance = np.linalg.norm(points[pairs.first] - points[pairs.second], axis=1)
+    ratio = overlap_ratio(pairs, distance, pitch)
+    return _voids(ground, points, row, pitch, np.flatnonzero(ratio < LONELY), pairs)
+
+
 def _leading(ground: Ground, added: Spots, points: Floats, row: Ints) -> Spots:
     """Of places for new bubbles in a symmetric pattern those of leaders, moved onto the planes they are
     close to.
