@@ -240,7 +240,8 @@ class BUBBLE_PATTERN_OT_apply(OnPattern, SteppedOperator, bpy.types.Operator):
             what = {"hole": "blind hole"}.get(part.kind, part.kind)
             if part.kind == "hole" and check.through:
                 what = "through-hole"
-            self.report({'INFO'}, f"Watertight part with {nouns(what, len(part.pierced))}")
+            made = f"Watertight part with {nouns(what, len(part.pierced))}"
+            self.report({'WARNING' if part.undercut.any() else 'INFO'}, " ".join([f"{made}.", *check.notes]))
 
 
 class BUBBLE_PATTERN_OT_edit(OnPattern, bpy.types.Operator):
