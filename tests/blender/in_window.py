@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import sys
 import traceback
 from collections.abc import Iterator
 from contextlib import AbstractContextManager
 from pathlib import Path
+from types import ModuleType
 
 import bpy
 
@@ -88,6 +90,70 @@ def until(condition: object, seconds: float = 60.0) -> Iterator[float]:
     raise AssertionError(f"waited in vain for {condition.__name__}")
 
 
+def module(name: str) -> ModuleType:
+    """A module of the extension that is installed here."""
+    return importlib.import_module(f"bl_ext.user_default.bubble_pattern.blender.{name}")
+
+
+def live_changes(pattern: bpy.types.Object) -> Iterator[float]:
+    """A burst of changes, as of a slider that is dragged: the pattern follows when the mouse rests."""
+    settings, generation = pattern.bubble_pattern, module("generation")
+    settings.diameter_mode = 'SHARE'
+    pitch, laid, real = settings.pitch, [], generation.put
+
+    def counted(*arguments: object) -> None:
+        laid.append(arguments)
+        real(*arguments)
+
+    generation.put = counted
+    yield 1.0
+    for step in range(1, 11):
+        settings.pitch = pitch * (1 + 0.02 * step)
+    found["laid in the burst"] = len(laid)
+
+    def followed() -> bool:
+        return not module("settings_recipe").is_outdated(settings)
+
+    yield from until(followed)
+    found["laid after the burst"] = len(laid)
+    found["points after the burst"] = len(pattern.data.vertices) == settings.count
+    generation.put = real
+    settings.pitch = pitch
+    yield from until(followed)
+
+
+def long_update(pattern: bpy.types.Object) -> Iterator[float]:
+    """A long packing: the view is turned meanwhile, keys that edit do nothing, a right click ends it."""
+    settings, stepping, runs = pattern.bubble_pattern, module("stepping"), module("runs")
+    before, pitch = settings.count, settings.pitch
+    settings.live = False
+    settings.pitch = pitch / 4
+    kept = stepping.PATIENCE, stepping.SLICE, stepping.LONGEST_SLICE
+    stepping.PATIENCE = stepping.SLICE = stepping.LONGEST_SLICE = 0.0  # one step at a time
+    found["long update"] = sorted(pressed("update"))
+
+    def settling() -> bool:
+        run = runs.under_way()
+        return run is not None and run.latest.snapshot is not None
+
+    yield from until(settling)
+    shown = view().spaces.active.region_3d
+    distance = shown.view_distance
+    place = region('WINDOW')
+    (window,) = bpy.context.window_manager.windows
+    for kind in ('WHEELUPMOUSE', 'X', 'RIGHTMOUSE'):
+        for value in ('PRESS', 'RELEASE'):
+            window.event_simulate(type=kind, value=value, x=place.x + 200, y=place.y + 200)
+        yield 1.0
+        if kind == 'X':
+            found["zoomed while packing"] = shown.view_distance != distance
+            found["still packing"] = runs.under_way() is not None
+    found["after the right click"] = [runs.under_way() is None, settings.count == before, pattern.name]
+    stepping.PATIENCE, stepping.SLICE, stepping.LONGEST_SLICE = kept
+    settings.pitch = pitch
+    settings.live = True
+
+
 def story() -> Iterator[float]:
     """What a designer does; yields the seconds to wait."""
     base = dome()
@@ -104,6 +170,9 @@ def story() -> Iterator[float]:
     pattern = bpy.data.objects[base.name + " Pattern"]
     found["features"] = pattern.bubble_pattern.count
     yield from tab()
+
+    yield from live_changes(pattern)
+    yield from long_update(pattern)
 
     fine = base.modifiers.new("Fine", 'SUBSURF')
     fine.levels = 2

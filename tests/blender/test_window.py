@@ -154,6 +154,13 @@ def test_a_designer_s_first_minute(screen: None, tmp_path: Path) -> None:
     assert "Python script error" not in said
     assert found["drawn"] > 0
     assert found["features"] > 200
+    assert found["laid in the burst"] <= 1
+    assert found["laid after the burst"] <= 2
+    assert found["points after the burst"]
+    assert found["long update"] == ["RUNNING_MODAL"]
+    assert found["zoomed while packing"]
+    assert found["still packing"]
+    assert found["after the right click"] == [True, True, "Grid Pattern"]
     assert found["long apply"] == ["RUNNING_MODAL"]
     assert found["objects after Esc"] == ["Grid", "Grid Pattern"]
     assert found["base after Esc"]
