@@ -1,4 +1,4 @@
-"""The cut shown before it is made: a Boolean modifier on the base, fed by the cutters of step 3.
+"""The part shown before it is made: a Boolean modifier on the base, fed by the solids of step 3.
 
 It is for the eye only. Whatever reads the base for the pattern switches it off first: it is never part of the
 base.
@@ -66,7 +66,8 @@ def show_cut(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     ):
         raise RegionError("The pattern is out of date: press Update before the cut is shown")
     pattern = read_pattern(obj, source.base.mesh)
-    plan = drive(plan_steps(source.base.mesh, pattern, recipe.feature, stamp_of(recipe.feature, context)))
+    stamp = stamp_of(recipe.feature, context)
+    plan = drive(plan_steps(source.base.mesh, pattern, recipe.feature, stamp))
     if not len(plan.cutters.mesh.triangles):
         raise RegionError("There is no feature that can be cut: Apply tells why")
     before = face_count(base, context)

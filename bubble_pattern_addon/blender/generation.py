@@ -24,6 +24,7 @@ from ..core.region import Region
 from ..core.results import Results, results_of
 from ..core.shaping import reshaped
 from . import live
+from .cut_preview import hide_cut
 from .noting import note_quality, note_results, noted_quality
 from .pattern_object import read_pattern, write_pattern, write_sizes
 from .preview_nodes import show_preview
@@ -142,6 +143,8 @@ def renewing_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[N
 def react(settings: Any, context: bpy.types.Context, repack: bool) -> None:
     """Answer a change of a setting in the panel: lay or shape the pattern anew; see live."""
     obj = settings.id_data
+    if settings.cut_preview and in_scene(settings.base):
+        hide_cut(settings.base)
     if not answers(settings, context) or live.is_taken_up(obj):
         return
     if settings.hand_made and (repack or not is_only_shape(settings)):

@@ -4,6 +4,7 @@ it twice, takes one edit back, cancels, applies and exports; then say what was f
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import sys
@@ -11,6 +12,7 @@ import traceback
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from pathlib import Path
+from types import ModuleType
 
 import bmesh
 import bpy
@@ -119,6 +121,71 @@ def the_pattern() -> bpy.types.Object:
     return next(obj for obj in bpy.data.objects if obj.bubble_pattern.base is not None)
 
 
+def module(name: str) -> ModuleType:
+    """A module of the extension that is installed here."""
+    return importlib.import_module(f"bl_ext.user_default.bubble_pattern.blender.{name}")
+
+
+def live_changes(pattern: bpy.types.Object) -> Iterator[float]:
+    """A burst of changes, as of a slider that is dragged: the pattern follows when the mouse rests."""
+    settings, generation = pattern.bubble_pattern, module("generation")
+    settings.diameter_mode = 'SHARE'
+    pitch, laid, real = settings.pitch, [], generation.put
+
+    def counted(*arguments: object) -> None:
+        laid.append(arguments)
+        real(*arguments)
+
+    generation.put = counted
+    yield 1.0
+    for step in range(1, 11):
+        settings.pitch = pitch * (1 + 0.02 * step)
+    found["laid in the burst"] = len(laid)
+
+    def followed() -> bool:
+        return not module("settings_recipe").is_outdated(settings)
+
+    yield from until(followed)
+    found["laid after the burst"] = len(laid)
+    found["points after the burst"] = len(pattern.data.vertices) == settings.count
+    generation.put = real
+    settings.pitch = pitch
+    yield from until(followed)
+
+
+def long_update(pattern: bpy.types.Object) -> Iterator[float]:
+    """A long packing: the view is turned meanwhile, keys that edit do nothing, a right click ends it."""
+    settings, stepping, runs = pattern.bubble_pattern, module("stepping"), module("runs")
+    before, pitch = settings.count, settings.pitch
+    settings.live = False
+    settings.pitch = pitch / 4
+    kept = stepping.PATIENCE, stepping.SLICE, stepping.LONGEST_SLICE
+    stepping.PATIENCE = stepping.SLICE = stepping.LONGEST_SLICE = 0.0  # one step at a time
+    found["long update"] = sorted(pressed("update"))
+
+    def settling() -> bool:
+        run = runs.under_way()
+        return run is not None and run.latest.snapshot is not None
+
+    yield from until(settling)
+    yield from photo("3-settling")
+    shown = view().spaces.active.region_3d
+    distance = shown.view_distance
+    place = region('WINDOW')
+    (window,) = bpy.context.window_manager.windows
+    for kind in ('WHEELUPMOUSE', 'X', 'RIGHTMOUSE'):
+        for value in ('PRESS', 'RELEASE'):
+            window.event_simulate(type=kind, value=value, x=place.x + 200, y=place.y + 200)
+        yield 1.0
+        if kind == 'X':
+            found["zoomed while packing"] = shown.view_distance != distance
+            found["still packing"] = runs.under_way() is not None
+    found["after the right click"] = [runs.under_way() is None, settings.count == before, pattern.name]
+    stepping.PATIENCE, stepping.SLICE, stepping.LONGEST_SLICE = kept
+    settings.pitch = pitch
+    settings.live = True
+
+
 def story() -> Iterator[float]:
     """What a designer does; yields the seconds to wait."""
     base = dome()
@@ -129,6 +196,8 @@ def story() -> Iterator[float]:
     edited("Select")
     yield from photo("1-select")
     yield from adding()
+    yield from live_changes(the_pattern())
+    yield from long_update(the_pattern())
     yield from editing()
     yield from cancelling()
     yield from applying()
@@ -154,12 +223,12 @@ def editing() -> Iterator[float]:
     yield from until(lambda: the_pattern().bubble_pattern.count < before)
     edited("Pitch")
     wide = the_pattern().bubble_pattern.count
-    yield from photo("3-wider")
+    yield from photo("4-wider")
     settings = the_pattern().bubble_pattern
     settings.profile, settings.turn = 'SLOT', 'BOUNDARY'
     yield 0.5
     edited("Slots")
-    yield from photo("4-slots")
+    yield from photo("5-slots")
     with inside('WINDOW'):
         bpy.ops.ed.undo()
     yield 0.5
@@ -180,7 +249,7 @@ def cancelling() -> Iterator[float]:
     found["objects after Esc"] = sorted(obj.name for obj in bpy.data.objects)
     found["base after Esc"] = base.visible_get()
     base.modifiers.remove(fine)
-    yield from photo("5-cancelled")
+    yield from photo("6-cancelled")
 
 
 def applying() -> Iterator[float]:
@@ -194,7 +263,7 @@ def applying() -> Iterator[float]:
     found["closed"] = is_closed(part.data)
     found["holes"] = settings.count
     found["verdict"] = settings.verdict
-    yield from photo("6-part")
+    yield from photo("7-part")
 
 
 def exporting() -> Iterator[float]:
