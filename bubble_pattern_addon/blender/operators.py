@@ -12,6 +12,7 @@ import bpy
 from bpy.props import BoolProperty, FloatProperty
 
 from ..core.errors import PatternError
+from ..core.feature_recipe import nouns
 from ..core.progress import Progress, Steps
 from .cut_preview import hide_cut
 from .field_properties import length_property, typed
@@ -85,7 +86,7 @@ class LayingOperator(SteppedOperator):
 
 
 class BUBBLE_PATTERN_OT_add(LayingOperator, bpy.types.Operator):
-    """Fill the selected faces with a tight pattern of holes; in Object Mode all faces or those marked"""
+    """Fill the selected faces with a tight pattern of features; in Object Mode all faces or those marked"""
 
     bl_idname = "bubble_pattern.add"
     bl_label = "Add Pattern"
@@ -214,7 +215,7 @@ class BUBBLE_PATTERN_OT_update(OnPattern, LayingOperator, bpy.types.Operator):
 
 
 class BUBBLE_PATTERN_OT_apply(OnPattern, SteppedOperator, bpy.types.Operator):
-    """Make the finished part, a solid with the holes, in place of the base, which is kept, hidden"""
+    """Make the finished part, a solid with the features, in place of the base, which is kept, hidden"""
 
     bl_idname = "bubble_pattern.apply"
     bl_label = "Apply"
@@ -233,10 +234,10 @@ class BUBBLE_PATTERN_OT_apply(OnPattern, SteppedOperator, bpy.types.Operator):
         if check.problems:
             self.report({'WARNING'}, " ".join(check.problems))
         else:
-            holes = (
-                f"{check.through:,} through-holes" if check.through else f"{len(part.pierced):,} blind holes"
-            )
-            self.report({'INFO'}, f"Watertight part with {holes}")
+            what = {"hole": "blind hole"}.get(part.kind, part.kind)
+            if part.kind == "hole" and check.through:
+                what = "through-hole"
+            self.report({'INFO'}, f"Watertight part with {nouns(what, len(part.pierced))}")
 
 
 class BUBBLE_PATTERN_OT_edit(OnPattern, bpy.types.Operator):
