@@ -62,7 +62,8 @@ class Row:
     ratio: float | None = None
 
 
-HEAD = "| region | method | n | seconds | ratio | six | ψ6 | gap CV | gap min | rim CV | edge | mirror |"
+FIGURES = "six | ψ6 | gap CV | gap min | rim CV | void"
+HEAD = f"| region | method | n | seconds | ratio | {FIGURES} | edge | mirror |"
 
 
 def print_rows(rows: Iterable[Row]) -> None:
@@ -72,7 +73,7 @@ def print_rows(rows: Iterable[Row]) -> None:
         figures = [
             *(_number(row.seconds, 3), "" if row.ratio is None else f"**{row.ratio:.2f}**"),
             *(_number(value, 3) for value in (q.six, q.psi6, q.gap_cv, q.gap_min)),
-            *(_number(q.rim_cv, 4), _number(row.edge, 4), _number(row.mirror, 2)),
+            *(_number(q.rim_cv, 4), _number(q.void, 3), _number(row.edge, 4), _number(row.mirror, 2)),
         ]
         print(f"| {row.region} | {row.method} | {row.n:,} | {' | '.join(figures)} |", flush=True)
 
@@ -245,7 +246,7 @@ GRADED = (
 def graded(repeats: int) -> None:
     """Graded packings, beside uniform ones at the same count on the same region."""
     print("\n## Packing, graded\n\nFigures are relative to the local pitch; ratio: to uniform at that count.")
-    print_head("| region | pitch | n | seconds | ratio | six | ψ6 | gap CV | gap min | gap mean | rim CV |")
+    print_head(f"| region | pitch | n | seconds | ratio | {FIGURES} | gap mean |")
     for name, words, field in GRADED:
         shape = SHAPES[name]()
         region = make_region(shape.mesh, shape.selected)
@@ -257,7 +258,8 @@ def graded(repeats: int) -> None:
         q = measure(pattern, region)
         print(
             f"| {name} | {words} | {len(pattern):,} | {ours:.3f} | **{ours / plain:.2f}** | {q.six:.3f} "
-            f"| {q.psi6:.3f} | {q.gap_cv:.3f} | {q.gap_min:.3f} | {gap.mean():.3f} | {q.rim_cv:.4f} |",
+            f"| {q.psi6:.3f} | {q.gap_cv:.3f} | {q.gap_min:.3f} | {q.rim_cv:.4f} | {q.void:.3f} "
+            f"| {gap.mean():.3f} |",
             flush=True,
         )
 

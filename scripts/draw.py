@@ -17,7 +17,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from bubble_pattern_addon.core.distance import boundary_distance
 from bubble_pattern_addon.core.mesh import Floats, Ints
-from bubble_pattern_addon.core.quality import Quality, measure_points, neighbours
+from bubble_pattern_addon.core.neighbours import neighbours
+from bubble_pattern_addon.core.quality import Quality, measure_points
 from scripts.benchmark import pack
 from scripts.shapes import SHAPES
 
@@ -143,7 +144,7 @@ def _fit(figure: Any, axes: Any) -> None:
 def _words(n: int, quality: Quality) -> str:
     return (
         f"n {n}  six {quality.six:.3f}  psi6 {quality.psi6:.3f}  gap cv {quality.gap_cv:.4f}  "
-        f"gap min {quality.gap_min:.3f}  rim cv {quality.rim_cv:.5f}"
+        f"gap min {quality.gap_min:.3f}  rim cv {quality.rim_cv:.5f}  void {quality.void:.3f}"
     )
 
 

@@ -166,8 +166,8 @@ def write_blend(path: Path, run: Run) -> None:
 
 
 def with_files_in(run: Run) -> Recipe:
-    """The recipe with the image and mesh files that it names taken into the open file, under names that fit
-    there.
+    """The recipe with the files that it names, images and meshes, taken into the open file, under names that
+    fit there.
     """
     names: dict[str, str] = {}
     for name in sorted(recipe_names(run.recipe).images):

@@ -27,14 +27,14 @@ def known(value: float) -> float:
 
 def note_quality(settings: Any, quality: Quality) -> None:
     """Write down the figures of a packing, on which sizes have no bearing."""
-    for name in ("six", "psi6", "gap_cv", "gap_min", "rim_cv"):
+    for name in ("six", "psi6", "gap_cv", "gap_min", "rim_cv", "void"):
         setattr(settings, name, known(getattr(quality, name)))
     settings.words = ";".join(f"{name},{word}" for name, word in words_of(quality).items() if word != UNKNOWN)
 
 
 def noted_quality(settings: Any) -> Quality:
     """The figures of the packing as written down, nan where nothing was measured."""
-    names = ("six", "psi6", "gap_cv", "gap_min", "rim_cv")
+    names = ("six", "psi6", "gap_cv", "gap_min", "rim_cv", "void")
     return Quality(*(value if (value := getattr(settings, name)) >= 0 else np.nan for name in names))
 
 

@@ -52,6 +52,7 @@ class ResultSettings:
     gap_cv: FloatProperty(default=-1.0, options={'HIDDEN'})
     gap_min: FloatProperty(name="Smallest Gap", options={'HIDDEN'})
     rim_cv: FloatProperty(default=-1.0, options={'HIDDEN'})
+    void: FloatProperty(default=-1.0, options={'HIDDEN'})
     words: StringProperty(options={'HIDDEN'})
     web: FloatProperty(name="Smallest Web", subtype='DISTANCE', options={'HIDDEN'})
     web_between: FloatVectorProperty(size=6, options={'HIDDEN'})

@@ -158,10 +158,10 @@ def packing_text(recipe: Recipe) -> str:
 
 def recipe_text(recipe: Recipe) -> str:
     """What the pattern's points depend on, as text; how the features are cut is left out."""
-    # the rules of a process depend on how deep a feature is
     feature = placing(recipe.feature)
     if recipe.limits.process is not None:
-        feature = replace(feature, depth=recipe.feature.depth)
+        # its rules depend on how deep and how steep a feature is
+        feature = replace(feature, depth=recipe.feature.depth, draft=recipe.feature.draft)
     return recipe_to_toml(replace(recipe, feature=feature, output=shaping_output(recipe)))
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .mesh import Floats
+from .mesh import Floats, Ints
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
@@ -37,10 +37,18 @@ def index_segments(segments: Floats) -> Segments:
 def distance_to(segments: Segments, points: Floats, within: float = np.inf) -> Floats:
     """Distance of every one of `points` (n, 3) to the nearest segment, (n,); those farther than `within` may
     be told as infinitely far.
+    """
+    return nearest_piece(segments, points, within)[0]
+
+
+def nearest_piece(segments: Segments, points: Floats, within: float = np.inf) -> tuple[Floats, Ints]:
+    """Distance of every one of `points` (n, 3) to the nearest piece, (n,), and which that is, (n,); those
+    farther than `within` may be told as infinitely far from any, -1.
 
     Exact: the pieces with the nearest middles are measured, more of them until none left out can be nearer.
     """
     best = np.full(len(points), np.inf)
+    which = np.full(len(points), -1)
     open_rows = np.arange(len(points))
     if np.isfinite(within):
         bound = (within + segments.half) * (1 + 1e-9)
@@ -52,11 +60,13 @@ def distance_to(segments: Segments, points: Floats, within: float = np.inf) -> F
         for start in range(0, len(open_rows), step):
             rows = open_rows[start : start + step]
             reach, piece = segments.tree.query(points[rows], np.arange(1, k + 1))
-            best[rows] = _point_segment(points[rows, None], segments.pieces[piece]).min(axis=1)
+            away = _point_segment(points[rows, None], segments.pieces[piece])
+            nearest, pick = away.argmin(axis=1), np.arange(len(rows))
+            best[rows], which[rows] = away[pick, nearest], piece[pick, nearest]
             beyond[start : start + step] = reach[:, -1] - segments.half
         open_rows = open_rows[beyond < best[open_rows]] if k < len(segments.pieces) else open_rows[:0]
         k = min(2 * k, len(segments.pieces))
-    return best
+    return best, which
 
 
 def boundary_distance(points: Floats, segments: Floats, within: float = np.inf) -> Floats:

@@ -22,9 +22,10 @@ from .feature_recipe import Feature
 from .feature_sizes import depths, feature_sizes
 from .floors import Broken, broken_rules, floors_for
 from .mesh import Floats, Ints, digest
+from .neighbours import Neighbours, neighbours
 from .pattern import Pattern, all_bubbles
 from .processes import PROCESSES
-from .quality import Neighbours, Quality, neighbours, open_area
+from .quality import Quality, open_area
 from .recipe import Recipe
 from .region import Region
 from .thickness import near_thickness

@@ -6,8 +6,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from .mesh import Bools, Floats, Ints
+from .neighbours import SHEET_TURN, same_sheet
 from .pattern import Pattern
-from .quality import SHEET_TURN, same_sheet
 from .region import Region
 
 # Features that touched would make a part that is no solid: this share of the pitch remains between two of

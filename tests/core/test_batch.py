@@ -113,7 +113,7 @@ def test_a_good_part_with_its_files(run) -> None:
     assert 0.05 < report["open_area"] < 0.25
     assert report["min_web"] > 1.5
     assert report["min_margin"] > 0.9
-    assert set(report["quality"]) == {"six", "psi6", "gap_cv", "gap_min", "rim_cv"}
+    assert set(report["quality"]) == {"six", "psi6", "gap_cv", "gap_min", "rim_cv", "void"}
     assert set(report["seconds"]) == {"region", "pack", "shape", "add"}
     assert report["wall"] == {"min": pytest.approx(4), "max": pytest.approx(4)}
     assert report["problems"] == []

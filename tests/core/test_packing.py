@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial import cKDTree
 
 from bubble_pattern_addon.core.errors import RegionError
 from bubble_pattern_addon.core.mesh import Floats
@@ -229,6 +230,24 @@ def test_population_control_fills_a_void_and_thins_a_crowd():
     assert len(thinned) == len(bubbles)
 
 
+@pytest.mark.parametrize(("name", "pitch", "middle"), [("disc", 0.4, (0, 0)), ("panel", 9.0, (20, -30))])
+@pytest.mark.parametrize("last", [False, True])
+def test_a_hole_of_many_bubbles_is_filled_at_once(name, pitch, middle, last):
+    _, ground, bubbles = packed(name, pitch)
+    points = points_of(ground, bubbles)
+    hole = (np.linalg.norm(points[:, :2] - middle, axis=1) < 3.2 * pitch) & can_move(bubbles)
+    assert hole.sum() > 25
+    rest = Bubbles(bubbles.spots.take(~hole), bubbles.fixed)
+    filled, changed = control(ground, rest, local_pitch(ground, rest), last)
+    assert changed == pytest.approx(hole.sum(), rel=0.2)
+    # everywhere in the hole somebody is near, and nobody too near
+    tree = cKDTree(points_of(ground, filled))
+    assert tree.query(points[hole])[0].max() < 0.95 * pitch
+    assert tree.query(points_of(ground, filled), 2)[0][:, 1].min() > 0.8 * pitch
+    unfilled, _ = control(ground, rest, local_pitch(ground, rest), True, False)
+    assert len(unfilled) == len(rest)
+
+
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 10**6))
 def test_uncrowded_is_going_through_all_by_rank(seed):
@@ -273,6 +292,8 @@ FLOORS = [
     ("sphere", 6.0, 0.94, 0.94, 0.03, 0.88, None),
     ("sphere", 5.8, 0.94, 0.94, 0.03, 0.88, None),
 ]
+# A void of one pitch's radius has room for another bubble; where rows meet at odds it is up to this.
+LARGEST_VOID = 0.9
 
 
 @pytest.mark.parametrize(("name", "pitch", "six", "psi6", "gap_cv", "gap_min", "rim_cv"), FLOORS)
@@ -291,8 +312,24 @@ def test_order_and_gaps_do_not_fall_below_what_was_reached(name, pitch, six, psi
     assert quality.psi6 >= psi6
     assert quality.gap_cv <= gap_cv
     assert quality.gap_min >= gap_min
+    assert quality.void < LARGEST_VOID
     if rim_cv is not None:
         assert quality.rim_cv <= rim_cv
+
+
+@pytest.mark.parametrize("name", ["l", "mixed", "parts", "thin-wall", "fold", "capsule", "torus"])
+def test_no_shape_has_room_for_another_bubble(name):
+    pitch = SHAPES[name]().pitch
+    region, ground, bubbles = packed(name, pitch)
+    spots = bubbles.spots
+    quality = measure_points(
+        positions(ground.charts, spots),
+        region.normals[spots.row],
+        np.full(len(bubbles), pitch),
+        can_move(bubbles).astype(np.int64),
+        region.boundary_segments,
+    )
+    assert quality.void < LARGEST_VOID
 
 
 def test_the_seed_makes_another_pattern_and_the_same_seed_the_same():

@@ -239,6 +239,7 @@ def test_a_graded_packing_is_in_order(
     assert quality.gap_cv <= 0.04
     assert quality.gap_min >= gap_min
     assert quality.rim_cv <= 0.015
+    assert quality.void < 0.9
     gap = cKDTree(pattern.position).query(pattern.position, 2)[0][:, 1] / pattern.pitch
     assert gap.mean() == pytest.approx(1, abs=0.04)
 

@@ -15,14 +15,13 @@ from scipy.spatial.transform import Rotation
 from bubble_pattern_addon.core.distance import boundary_distance
 from bubble_pattern_addon.core.mesh import Floats, Mesh
 from bubble_pattern_addon.core.metric import Places
+from bubble_pattern_addon.core.neighbours import REACH, neighbours
 from bubble_pattern_addon.core.pattern import Pattern
 from bubble_pattern_addon.core.quality import (
-    REACH,
     measure,
     measure_points,
     min_margin,
     min_web,
-    neighbours,
     open_area,
 )
 from bubble_pattern_addon.core.region import Region, make_region
@@ -126,6 +125,48 @@ def test_nothing_to_measure_is_nan_not_a_number_that_looks_good():
     assert np.isnan([empty.six, empty.psi6, empty.gap_cv, empty.gap_min, empty.rim_cv]).all()
 
 
+def test_a_lattice_has_no_void_and_one_bubble_less_leaves_room_for_it():
+    points = hexagonal()
+    segments = frame(points, 0.5)
+    assert plain_measure(points, segments).void == pytest.approx(1 / np.sqrt(3))
+    middle = np.linalg.norm(points - points.mean(axis=0), axis=1).argmin()
+    assert plain_measure(np.delete(points, middle, axis=0), segments).void == pytest.approx(1.0)
+    # in the first row, and seven together
+    first = np.flatnonzero(boundary_distance(points, segments) < 0.6)[7]
+    assert plain_measure(np.delete(points, first, axis=0), segments).void == pytest.approx(1.0)
+    seven = np.linalg.norm(points - points[middle], axis=1) < 1.1
+    assert plain_measure(points[~seven], segments).void == pytest.approx(np.sqrt(3), abs=1e-6)
+
+
+def test_a_hole_in_the_region_is_no_void():
+    points = hexagonal()
+    middle = points[np.linalg.norm(points - points.mean(axis=0), axis=1).argmin()]
+    seven = np.linalg.norm(points - middle, axis=1) < 1.1
+    corners = middle + 0.9 * np.exp(-1j * np.pi / 3 * np.arange(6)).view(np.float64).reshape(-1, 2).dot(
+        np.eye(2, 3)
+    )
+    island = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+    around = np.concatenate([frame(points, 0.5), island])
+    assert plain_measure(points[~seven], around).void < 0.75
+
+
+def test_a_gap_in_a_single_row_is_a_void():
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [2.7, 0, 0], [3.7, 0, 0]])
+    assert plain_measure(points, frame(points, 0.5)).void == pytest.approx(0.85)
+
+
+def test_voids_are_seen_on_each_side_of_a_wall_and_relative_to_the_pitch_there():
+    points = hexagonal(14, 14)
+    middle = np.linalg.norm(points - points.mean(axis=0), axis=1).argmin()
+    above = np.delete(points, middle, axis=0) + [0, 0, 0.05]
+    both, normal = np.concatenate([above, points]), np.concatenate([up(above), -up(points)])
+    row = np.ones(len(both), dtype=np.int64)
+    assert measure_points(both, normal, np.ones(len(both)), row, NO_BOUNDARY).void == pytest.approx(1.0)
+    assert measure_points(3 * both, normal, np.full(len(both), 3.0), row, NO_BOUNDARY).void == pytest.approx(
+        1.0
+    )
+
+
 def test_two_bubbles_are_each_others_neighbours():
     points = np.array([[0.0, 0, 0], [0.9, 0, 0]])
     assert pairs(points, up(points), np.ones(2)) == {(0, 1), (1, 0)}
@@ -160,7 +201,7 @@ def test_figures_do_not_depend_on_unit_place_or_direction(seed: int, scale: floa
     there = measure_points(
         moved(points), turn.apply(up(points)), np.full(len(points), scale), row, moved(segments)
     )
-    for name in ("six", "psi6", "gap_cv", "gap_min", "rim_cv"):
+    for name in ("six", "psi6", "gap_cv", "gap_min", "rim_cv", "void"):
         assert getattr(there, name) == pytest.approx(getattr(here, name), rel=1e-6, abs=1e-8), name
 
 

@@ -289,6 +289,21 @@ def test_a_batch_run_solves_and_reports_all_of_it(tmp_path: Path, capsys: pytest
     assert "holes" in capsys.readouterr().out
 
 
+def test_drills_are_as_large_on_a_base_in_metres(tmp_path: Path) -> None:
+    """A glTF file says that it is in metres; the recipe does not, so its lengths are metres too."""
+    plate = box((-0.03, -0.02, -0.0015), (0.03, 0.02, 0.0))
+    write_mesh(tmp_path / "plate.glb", plate)
+    text = FILE.format(target=0.2).replace("pitch = 5.0", "pitch = 0.005").replace("2.5", "0.0025")
+    (tmp_path / "recipe.toml").write_text(text)
+    options = [str(tmp_path / "recipe.toml"), "--base", str(tmp_path / "plate.glb")]
+    assert batch.main([*options, "--out", str(tmp_path / "out"), "--quiet"]) == 0
+    report = json.loads((tmp_path / "out" / "report.json").read_text())
+    sizes = [1000 * entry["diameter"] for entry in report["nominal"]]
+    assert np.allclose(np.round(sizes, 1), sizes)
+    assert min(sizes) >= 1.5
+    assert report["removed_mass"] == pytest.approx(7.85e6 * report["removed_volume"])
+
+
 def test_a_batch_run_that_can_not_solve_leaves_nothing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

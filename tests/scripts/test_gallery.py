@@ -19,6 +19,7 @@ from bubble_pattern_addon.core.metric import Places
 from bubble_pattern_addon.core.pattern import Pattern
 from bubble_pattern_addon.core.pipeline import pattern_steps
 from bubble_pattern_addon.core.progress import drive
+from bubble_pattern_addon.core.quality import measure
 from bubble_pattern_addon.core.recipe import Recipe
 from bubble_pattern_addon.core.recipe_file import load_recipe
 from bubble_pattern_addon.core.region import Region, make_region
@@ -121,6 +122,7 @@ def test_no_hole_is_missing_anywhere(name: str) -> None:
     distance, _ = cKDTree(pattern.places.position).query(position)
     # 0.58 in the middle of three, 0.71 of four; a place left out makes it 1
     assert (distance / pitch).max() < 0.9
+    assert measure(pattern, region).void < 0.9
 
 
 def test_result_2_has_one_size_in_the_centre_and_smaller_ones_beside_it() -> None:

@@ -18,7 +18,7 @@ STIFFNESS = 12.0
 # The last phase pushes pairs apart that are closer than this share of their stable distance.
 EVEN = 0.985
 # Bubbles whose pitches differ by no more than this factor are of one size class.
-CLASS = 1.35
+CLASS = 1.6
 # No bubble has more others near: on a crowded spot a dozen have room within 1.66 pitches, and as many on the
 # other side of a thin wall.
 MOST_NEAR = 28
@@ -33,6 +33,9 @@ class Pairs(NamedTuple):
     first: Ints
     second: Ints
     stable: Floats
+
+
+NO_PAIRS = Pairs(np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), np.empty(0))
 
 
 def force_law(w: Floats) -> Floats:
@@ -73,11 +76,19 @@ def find_pairs(charts: Charts, points: Floats, row: Ints, pitch: Floats, skin: f
         size = np.floor(np.log(pitch / pitch.min()) / np.log(CLASS)).astype(np.int64)
         found = [_pairs_of_class(points, pitch, size, number, reach) for number in np.unique(size)]
         first, second = np.concatenate(found, axis=1)
-    stable = (pitch[first] + pitch[second]) / 2
-    away = points[first] - points[second]
-    close = np.einsum("mc,mc->m", away, away) < (reach * stable) ** 2
-    close &= region.same_side(row[first], row[second])
-    return Pairs(first[close], second[close], stable[close])
+    pairs = within_reach(Pairs(first, second, (pitch[first] + pitch[second]) / 2), points, skin)
+    if region.single_sheet:
+        return pairs
+    same = region.same_side(row[pairs.first], row[pairs.second])
+    return Pairs(pairs.first[same], pairs.second[same], pairs.stable[same])
+
+
+def within_reach(pairs: Pairs, points: Floats, skin: float) -> Pairs:
+    """Those of the pairs that are closer now than 1.5 stable distances plus `skin` pitches."""
+    away = points.take(pairs.first, axis=0)
+    away -= points.take(pairs.second, axis=0)
+    close = np.einsum("mc,mc->m", away, away) < ((REACH + skin) * pairs.stable) ** 2
+    return Pairs(pairs.first[close], pairs.second[close], pairs.stable[close])
 
 
 def _pairs_of_class(at: Floats, pitch: Floats, size: Ints, number: int, reach: float) -> Ints:

@@ -137,13 +137,13 @@ def _proposals(
     ahead[:, :3] += to_space(charts, start.row, way * length)
     free = crowd.distance(ahead, 0.6 * length.max()) > 0.6 * length
     start, way, length = start.take(free), way[free], length[free]
-    walked = walk(charts, start, way * length, carried=way)
+    walked = walk(charts, start, way * length, carried=way, stopping=False)
     # The stable distance is the mean of both pitches: go on, or back, by half of what they differ.
     lacking = (pitch(walked.arrived) - length) / 2
     inside = walked.left == 0
     arrived, carried, lacking = walked.arrived.take(inside), walked.carried[inside], lacking[inside]
     if np.any(np.abs(lacking) > 1e-9 * length.max(initial=1.0)):
-        again = walk(charts, arrived, carried * lacking, carried=carried)
+        again = walk(charts, arrived, carried * lacking, carried=carried, stopping=False)
         inside = again.left == 0
         arrived, carried = again.arrived.take(inside), again.carried[inside]
     return arrived, carried

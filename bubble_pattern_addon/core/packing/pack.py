@@ -26,7 +26,7 @@ from .narrows import in_the_narrows
 from .orbits import orbit_sizes, settled_leaders, symmetric_start, with_followers
 from .pins import PUSHED, check_apart, clear_of, on_surface, track_through, with_pins
 from .plane import fills_its_box, lay
-from .population import control, pressed_out
+from .population import control
 from .relax import relax_steps
 from .rim import (
     FirstRow,
@@ -56,7 +56,7 @@ TURNS = (0.0, 15.0, 30.0, 45.0)
 CRAMPED = 1.02
 # Rounds of relaxation and population control, and how many steps each may take; the last phases' steps.
 ROUNDS = 3
-STIFF_STEPS = 45
+STIFF_STEPS, LAST_ROUNDS = 45, 4
 NOT_SYMMETRIC = "The pattern is not symmetric: some of its features are placed by hand."
 
 
@@ -162,7 +162,7 @@ def _settled(
         if not changed:
             break
     yield Progress("Evening out the gaps", 0.8)
-    while True:
+    for number in range(LAST_ROUNDS):
         local = local_pitch(ground, bubbles)
         size, stiffness = filling(ground, bubbles, local), 1.0 + STIFFNESS
         evening = relax_steps(
@@ -176,11 +176,12 @@ def _settled(
             stage="Evening out the gaps",
         )
         bubbles, _ = yield from within(evening, 0.8, 0.95)
-        kept = ~pressed_out(ground, bubbles, local_pitch(ground, bubbles))
-        if kept.all():
+        # What stiff contacts have squeezed through the first row has no place between it and the boundary,
+        # and what these have opened another bubble may fit into.
+        local, more = local_pitch(ground, bubbles), number + 1 < LAST_ROUNDS
+        bubbles, changed = control(ground, bubbles, local, last=True, filling=more)
+        if not changed:
             break
-        # What stiff contacts have squeezed through the first row has no place between it and the boundary.
-        bubbles = Bubbles(bubbles.spots.take(kept), bubbles.fixed)
     if ground.symmetry is not None:
         bubbles = with_followers(ground, settled_leaders(ground, bubbles))
     return bubbles

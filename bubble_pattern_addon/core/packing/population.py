@@ -17,6 +17,11 @@ from .orbits import HALO, followers_of, leaders_of, on_their_planes, ranked, set
 # A circle through three bubbles with no other inside is a void when its radius is above this share of the
 # pitch (it is 0.577 in the hexagonal arrangement, 0.707 in the square one).
 VOID = 0.8
+# Larger voids than WIDE take more than one bubble: they are filled from their edges inward, in so many rows
+# at most, with bubbles that stand beside two neighbours no farther apart than BESIDE, in stable distances,
+# where nobody is nearer than FREE. Three bubbles on a larger circle than WIDEST are rather in a row.
+WIDE, WIDEST = 1.3, 6.0
+MOST_ROWS, BESIDE, FREE = 12, 1.4, 0.88
 # Free bubbles nearer to the boundary than this many radii have been pressed through the first row.
 PRESSED_OUT = 2.2
 # A bubble whose overlap ratio is above this is too crowded; it is 6 in the hexagonal arrangement.
@@ -24,6 +29,8 @@ PRESSED_OUT = 2.2
 CROWDED, CROWDED_GRADED = 6.8, 6.4
 # Only bubbles with less overlap than this can stand at a void.
 LONELY = 5.6
+# At the end voids of a radius above this share of the pitch are filled.
+LAST_VOID = 0.9
 
 
 def overlap_ratio(pairs: Pairs, distance: Floats, pitch: Floats) -> Floats:
@@ -38,10 +45,14 @@ def overlap_ratio(pairs: Pairs, distance: Floats, pitch: Floats) -> Floats:
     return ratio
 
 
-def control(ground: Ground, bubbles: Bubbles, pitch: Floats) -> tuple[Bubbles, int]:
+def control(
+    ground: Ground, bubbles: Bubbles, pitch: Floats, last: bool = False, filling: bool = True
+) -> tuple[Bubbles, int]:
     """Bubbles without the too crowded ones and with new ones in the voids; and how many came or went.
 
-    In a symmetric pattern these are the leaders, and whoever comes or goes does so with its followers.
+    In a symmetric pattern these are the leaders, and whoever comes or goes does so with its followers. At
+    the `last` only those that are pressed out go, and only voids that another bubble fits into are filled,
+    if there is to be any `filling`.
     """
     spots, n, m = bubbles.spots, len(bubbles), bubbles.fixed
     owner = np.arange(n)
@@ -52,10 +63,13 @@ def control(ground: Ground, bubbles: Bubbles, pitch: Floats) -> tuple[Bubbles, i
     pairs = find_pairs(ground.charts, points, row, everywhere, 0.0)
     distance = np.linalg.norm(points[pairs.first] - points[pairs.second], axis=1)
     ratio = overlap_ratio(pairs, distance, everywhere)
-    gone = pressed_out(ground, bubbles, pitch)
-    most = CROWDED if ground.uniform is not None else CROWDED_GRADED
-    gone[m:] |= _too_crowded(pairs, distance / pairs.stable, ratio[:n], owner, m, most)
-    added = _voids(ground, points, row, everywhere, np.flatnonzero(ratio < LONELY), pairs)
+    gone = _pressed_out(ground, bubbles, pitch, pairs)
+    if not last:
+        most = CROWDED if ground.uniform is not None else CROWDED_GRADED
+        gone[m:] |= _too_crowded(pairs, distance / pairs.stable, ratio[:n], owner, m, most)
+    lonely, least = np.flatnonzero(ratio < LONELY), LAST_VOID if last else VOID
+    lonely = lonely if filling else lonely[:0]
+    added = _voids(ground, points, row, everywhere, lonely, pairs, least)
     if not gone.any() and not len(added.row):
         return bubbles, 0
     if ground.symmetry is None:
@@ -71,7 +85,7 @@ def voids_among(ground: Ground, spots: Spots, pitch: Floats) -> Spots:
     pairs = find_pairs(ground.charts, points, row, pitch, 0.0)
     distance = np.linalg.norm(points[pairs.first] - points[pairs.second], axis=1)
     ratio = overlap_ratio(pairs, distance, pitch)
-    return _voids(ground, points, row, pitch, np.flatnonzero(ratio < LONELY), pairs)
+    return _voids(ground, points, row, pitch, np.flatnonzero(ratio < LONELY), pairs, VOID)
 
 
 def _leading(ground: Ground, added: Spots, points: Floats, row: Ints) -> Spots:
@@ -89,13 +103,17 @@ def _leading(ground: Ground, added: Spots, points: Floats, row: Ints) -> Spots:
     return added.take(leaders_of(ground, added, ranked(ground, added, 0)))
 
 
-def pressed_out(ground: Ground, bubbles: Bubbles, pitch: Floats) -> Bools:
-    """Which bubbles, (n,), are between the first row and the boundary."""
-    out = np.zeros(len(bubbles), dtype=bool)
-    free = bubbles.spots.take(np.arange(bubbles.fixed, len(bubbles)))
-    if ground.boundary is not None and len(free.row):
-        distance, _ = nearest_boundary(ground.boundary, positions(ground.charts, free), free.row)
-        out[bubbles.fixed :] = distance < PRESSED_OUT * pitch[bubbles.fixed :] / 2 + ground.edge_offset
+def _pressed_out(ground: Ground, bubbles: Bubbles, pitch: Floats, pairs: Pairs) -> Bools:
+    """Which bubbles, (n,), are between the first row and the boundary, where some of that row feel them."""
+    fixed, n = bubbles.fixed, len(bubbles)
+    out = np.zeros(n, dtype=bool)
+    if ground.boundary is None:
+        return out
+    beside = np.concatenate([pairs.first[pairs.second < fixed], pairs.second[pairs.first < fixed]])
+    asked = np.unique(beside[(beside >= fixed) & (beside < n)])
+    spots = bubbles.spots.take(asked)
+    distance, _ = nearest_boundary(ground.boundary, positions(ground.charts, spots), spots.row)
+    out[asked] = distance < PRESSED_OUT * pitch[asked] / 2 + ground.edge_offset
     return out
 
 
@@ -118,25 +136,40 @@ def _too_crowded(pairs: Pairs, relative: Floats, ratio: Floats, owner: Ints, m: 
     return (crowded & kept)[m:]
 
 
-def _voids(ground: Ground, points: Floats, row: Ints, pitch: Floats, lonely: Ints, pairs: Pairs) -> Spots:
-    """Places for new bubbles: centres of empty circles through three of the `lonely` bubbles, as local
-    Delaunay has them. `pairs` are those of all bubbles.
+def _voids(
+    ground: Ground, points: Floats, row: Ints, pitch: Floats, lonely: Ints, pairs: Pairs, least: float
+) -> Spots:
+    """Places for new bubbles in the voids round which the `lonely` of the bubbles stand, where the circle
+    that fits in has a radius above `least`.
+    """
+    added, wide = _in_circles(ground, points, row, pitch, lonely, pairs, least)
+    return joined(added, _fillings(ground, points, row, pitch, lonely, added)) if wide else added
+
+
+def _in_circles(
+    ground: Ground, points: Floats, row: Ints, pitch: Floats, lonely: Ints, pairs: Pairs, least: float
+) -> tuple[Spots, bool]:
+    """Places for new bubbles: centres of empty circles of a radius above `least` through three of the
+    `lonely` bubbles, as local Delaunay has them; and whether there are circles too large for one bubble.
+    `pairs` are those of all bubbles.
     """
     region, charts = ground.charts.region, ground.charts
     nothing = Spots(np.empty(0, dtype=np.int64), np.empty((0, 3)))
     if len(lonely) < 3:
-        return nothing
+        return nothing, False
     at, local = points[lonely], pitch[lonely]
     reach = float(local.max())
     where = signature(region, at, row[lonely], reach)
     triple = _triples(close_pairs(where, 2.4 * local), len(lonely))
     if not len(triple):
-        return nothing
+        return nothing, False
     centre, radius = _circumcircles(at[triple])
     mean = local[triple].mean(axis=1)
-    wide = (radius > VOID * mean) & (radius < 1.3 * mean)
-    wide[wide] = ~_taken(points, pairs, lonely[triple[wide]], centre[wide], 0.7 * radius[wide])
-    triple, centre, radius, mean = triple[wide], centre[wide], radius[wide], mean[wide]
+    empty = (radius > least * mean) & (radius < WIDEST * mean)
+    empty[empty] = ~_taken(points, pairs, lonely[triple[empty]], centre[empty], 0.7 * radius[empty])
+    wide = bool((empty & (radius > WIDE * mean)).any())
+    empty &= radius < WIDE * mean
+    triple, centre, radius, mean = triple[empty], centre[empty], radius[empty], mean[empty]
     corner = lonely[triple[:, 0]]
     start = _spots_of(charts, points[corner], row[corner])
     arrived = walk(charts, start, to_frame(charts, start.row, centre - points[corner])).arrived
@@ -148,10 +181,62 @@ def _voids(ground: Ground, points: Floats, row: Ints, pitch: Floats, lonely: Int
         kept &= distance > PRESSED_OUT * mean / 2 + ground.edge_offset
     arrived, radius, mean = arrived.take(kept), radius[kept], mean[kept]
     if not len(mean):
-        return nothing
+        return nothing, wide
     where = signature(region, positions(charts, arrived), arrived.row, reach)
     rank = np.lexsort((np.arange(len(mean)), -radius / mean)).argsort()
-    return arrived.take(uncrowded(close_pairs(where, 0.9 * mean), rank))
+    return arrived.take(uncrowded(close_pairs(where, 0.9 * mean), rank)), wide
+
+
+def _fillings(ground: Ground, points: Floats, row: Ints, pitch: Floats, lonely: Ints, added: Spots) -> Spots:
+    """Places for new bubbles in wide voids, row after row from the edge inward: beside two of the `lonely`
+    bubbles or of those that were `added`, at the stable distance from both.
+    """
+    charts = ground.charts
+    at = np.concatenate([points, positions(charts, added)])
+    rows, local = np.concatenate([row, added.row]), np.concatenate([pitch, ground.pitch(added)])
+    front = np.concatenate([lonely, np.arange(len(points), len(at))])
+    found: list[Spots] = []
+    for _ in range(MOST_ROWS):
+        spots = _beside_two(ground, at, rows, local, front)
+        if not len(spots.row):
+            break
+        found.append(spots)
+        front = np.concatenate([front, np.arange(len(at), len(at) + len(spots.row))])
+        at, rows = np.concatenate([at, positions(charts, spots)]), np.concatenate([rows, spots.row])
+        local = np.concatenate([local, ground.pitch(spots)])
+    return joined(*found) if found else added.take(np.zeros(0, dtype=np.int64))
+
+
+def _beside_two(ground: Ground, points: Floats, row: Ints, pitch: Floats, front: Ints) -> Spots:
+    """Free places at the stable distance from two neighbours among the bubbles `front`."""
+    charts, region = ground.charts, ground.charts.region
+    one, two = front[close_pairs(points[front], BESIDE * pitch[front])].T
+    same = region.same_side(row[one], row[two])
+    one, two = np.concatenate([one[same], two[same]]), np.concatenate([two[same], one[same]])
+    between = points[two] - points[one]
+    length = np.linalg.norm(between, axis=1)
+    new = (pitch[one] + pitch[two]) / 2
+    to_one, to_two = (pitch[one] + new) / 2, (pitch[two] + new) / 2
+    along = (length**2 + to_one**2 - to_two**2) / (2 * np.maximum(length, 1e-300))
+    across = np.sqrt(np.maximum(to_one**2 - along**2, 0.0))
+    # Each pair is there in both directions, the other side on its left.
+    ahead = between / np.maximum(length, 1e-300)[:, None]
+    left = np.cross(region.normals[row[one]], ahead)
+    target = points[one] + along[:, None] * ahead + across[:, None] * left
+    free = cKDTree(points).query(target)[0] > 0.8 * FREE * new
+    one, target = one[free], target[free]
+    if ground.boundary is not None:
+        distance, _ = nearest_boundary(ground.boundary, target, row[one])
+        inside = distance > PRESSED_OUT * new[free] / 2 + ground.edge_offset
+        one, target = one[inside], target[inside]
+    start = _spots_of(charts, points[one], row[one])
+    arrived = walk(charts, start, to_frame(charts, start.row, target - points[one])).arrived
+    reached, local = positions(charts, arrived), ground.pitch(arrived)
+    kept = np.linalg.norm(reached - target, axis=1) < 0.2 * local
+    kept &= _empty(ground, arrived, reached, points, row, FREE * local)
+    arrived, reached, local = arrived.take(kept), reached[kept], local[kept]
+    where = signature(region, reached, arrived.row, float(local.max(initial=0.0)))
+    return arrived.take(uncrowded(close_pairs(where, FREE * local), np.arange(len(local))))
 
 
 def _taken(points: Floats, pairs: Pairs, triple: Ints, centre: Floats, radius: Floats) -> Bools:

@@ -16,12 +16,15 @@ from ..mesh import Bools, Floats, Ints
 from ..progress import Snapshot
 from ..surface import Spots, positions, to_frame, walk
 from .bubbles import Bubbles, Ground, can_move, joined
-from .force import Law, Pairs, find_pairs, renewed_pairs
+from .force import NO_PAIRS, Law, Pairs, find_pairs, renewed_pairs, within_reach
 from .orbits import HALO, Followers, followers_of, held
 
 # Pairs are listed with this reserve, in pitches (small enough to leave a lattice's next shell out, at 1.73),
 # and a bubble's are listed anew when it has moved by half of that.
 SKIN = 0.16
+# Pairs of bubbles of different sizes take long to find: they are listed out to this reserve as well, which
+# holds for several of the shorter lists: until a bubble has moved so far, in pitches.
+WIDE_SKIN, WIDE_MOVED = 0.7, 0.4
 # Where fewer bubbles are at work, telling some apart from the others costs more than it spares.
 FEW = 3000
 # How far bubbles may move between two landings, in pitches: AFLOAT at first, then so far that by what they
@@ -49,7 +52,8 @@ class Swarm:
     may have moved since, in pitches, and afloat: how far they may; pairs are valid while no bubble is farther
     than half the skin from listed_at (n, 3), and none is farther from there than strayed, in pitches;
     followers: in a symmetric pattern, those that stand after the bubbles and go where these take them; still:
-    rows of the bubbles that stay on a plane or an axis, and the projectors (s, 3, 3) onto it
+    rows of the bubbles that stay on a plane or an axis, and the projectors (s, 3, 3) onto it; wide: where the
+    pitch is graded, the pairs out to the wide skin, and where all bubbles were when these were listed (n, 3)
     """
 
     ground: Ground
@@ -67,6 +71,7 @@ class Swarm:
     strayed: float = 0.0
     followers: Followers | None = None
     still: tuple[Ints, Floats] | None = None
+    wide: tuple[Pairs, Floats] | None = None
     work: Work = field(default_factory=Work)
 
     @property
@@ -87,7 +92,7 @@ def swarm_of(ground: Ground, bubbles: Bubbles, pitch: Floats) -> Swarm:
         spots = joined(spots, followers.spots)
         pitch = np.concatenate([pitch, pitch[followers.leader]])
     points = positions(charts, spots)
-    return Swarm(
+    swarm = Swarm(
         ground=ground,
         bubbles=bubbles,
         pitch=pitch,
@@ -96,17 +101,34 @@ def swarm_of(ground: Ground, bubbles: Bubbles, pitch: Floats) -> Swarm:
         row=spots.row.copy(),
         bary=spots.barycentric.copy(),
         normal=charts.region.normals[spots.row],
-        pairs=find_pairs(charts, points, spots.row, pitch, SKIN),
+        pairs=NO_PAIRS,
         listed_at=points.copy(),
         followers=followers,
         still=still,
     )
+    swarm.pairs = _pairs_now(swarm)
+    return swarm
 
 
 def snapshot(swarm: Swarm) -> Snapshot:
     """The bubbles as they are now."""
     n = len(swarm.bubbles)
     return Snapshot(swarm.points[:n].copy(), swarm.normal[:n].copy(), swarm.pitch[:n].copy())
+
+
+def _pairs_now(swarm: Swarm) -> Pairs:
+    """All pairs within the skin, of bubbles of different sizes from the wide list as long as that holds."""
+    charts, points, row, pitch = swarm.ground.charts, swarm.points, swarm.row, swarm.pitch
+    if swarm.ground.uniform is not None:
+        return find_pairs(charts, points, row, pitch, SKIN)
+    if swarm.wide is not None:
+        away = points - swarm.wide[1]
+        shift = np.einsum("nc,nc->n", away, away) / pitch**2
+        if shift.max(initial=0.0) > WIDE_MOVED**2:
+            swarm.wide = None
+    if swarm.wide is None:
+        swarm.wide = find_pairs(charts, points, row, pitch, WIDE_SKIN), points.copy()
+    return within_reach(swarm.wide[0], points, SKIN)
 
 
 def follow(swarm: Swarm) -> None:
@@ -261,7 +283,7 @@ def list_anew(swarm: Swarm, active: Ints, beyond: float) -> bool:
     stale = np.flatnonzero(moved)
     charts, points, row, pitch = swarm.ground.charts, swarm.points, swarm.row, swarm.pitch
     if len(stale) > 0.3 * len(points) or len(points) < FEW:
-        swarm.pairs = find_pairs(charts, points, row, pitch, SKIN)
+        swarm.pairs = _pairs_now(swarm)
         swarm.listed_at, swarm.strayed = points.copy(), 0.0
     else:
         swarm.pairs = renewed_pairs(swarm.pairs, stale, charts, points, row, pitch, SKIN)
