@@ -65,8 +65,8 @@ def growing_steps(
             yield Progress(
                 "Growing the lattice", total / (total + full), partial(_grown, charts, pitch, born)
             )
-        proposals, turned = _proposals(charts, pitch, crowd, front, front_heading)
-        front, front_heading = _agreed(charts, pitch, crowd, proposals, turned)
+        proposals, turned, beyond = _proposals(charts, pitch, crowd, front, front_heading)
+        front, front_heading = _agreed(charts, pitch, crowd, proposals, turned, beyond)
         if field is not None:
             front_heading = _following(front_heading, field[front.row])
         crowd.add(front)
@@ -124,9 +124,9 @@ class _Crowd:
 
 def _proposals(
     charts: Charts, pitch: Lengths, crowd: _Crowd, front: Spots, heading: Complex
-) -> tuple[Spots, Complex]:
+) -> tuple[Spots, Complex, Complex]:
     """Places one pitch from the front's bubbles where no bubble is yet, with the row directions carried
-    there.
+    there, and the steps from there, each in its triangle's frame, to what the stable distance is.
     """
     parent = np.repeat(np.arange(len(front.row)), 6)
     start = front.take(parent)
@@ -138,27 +138,33 @@ def _proposals(
     free = crowd.distance(ahead, 0.6 * length.max()) > 0.6 * length
     start, way, length = start.take(free), way[free], length[free]
     walked = walk(charts, start, way * length, carried=way, stopping=False)
-    # The stable distance is the mean of both pitches: go on, or back, by half of what they differ.
-    lacking = (pitch(walked.arrived) - length) / 2
     inside = walked.left == 0
-    arrived, carried, lacking = walked.arrived.take(inside), walked.carried[inside], lacking[inside]
-    if np.any(np.abs(lacking) > 1e-9 * length.max(initial=1.0)):
-        again = walk(charts, arrived, carried * lacking, carried=carried, stopping=False)
-        inside = again.left == 0
-        arrived, carried = again.arrived.take(inside), again.carried[inside]
-    return arrived, carried
+    arrived, carried = walked.arrived.take(inside), walked.carried[inside]
+    # The stable distance is the mean of both pitches: on, or back, by half of what they differ.
+    lacking = carried * (pitch(arrived) - length[inside]) / 2
+    if charts.region.flat or np.all(np.abs(lacking) < 1e-9 * length.max(initial=1.0)):
+        return arrived, carried, lacking
+    again = walk(charts, arrived, lacking, carried=carried, stopping=False)
+    inside = again.left == 0
+    return again.arrived.take(inside), again.carried[inside], np.zeros(int(inside.sum()), np.complex128)
 
 
 def _agreed(
-    charts: Charts, pitch: Lengths, crowd: _Crowd, proposals: Spots, heading: Complex
+    charts: Charts, pitch: Lengths, crowd: _Crowd, proposals: Spots, heading: Complex, beyond: Complex
 ) -> tuple[Spots, Complex]:
-    """One bubble for each group of proposals that mean the same place, where it crowds nobody."""
+    """One bubble for each group of proposals that mean the same place, where it crowds nobody.
+
+    beyond: (n,) steps from the proposals to the places that they mean
+    """
     if not len(proposals.row):
         return proposals, heading
     local = pitch(proposals)
     at = crowd.where(proposals)
+    from_here = at[:, :3].copy()
+    at[:, :3] += to_space(charts, proposals.row, beyond)
     free = crowd.distance(at, crowd.crowded * local.max()) > crowd.crowded * local
     proposals, heading, local, at = proposals.take(free), heading[free], local[free], at[free]
+    from_here = from_here[free]
     if not len(local):
         return proposals, heading
     pairs = close_pairs(at, SAME * local)
@@ -169,7 +175,8 @@ def _agreed(
     votes = np.bincount(group, minlength=groups)
     mean = np.stack([np.bincount(group, at[:, axis], groups) for axis in range(3)], axis=1) / votes[:, None]
     leader = proposals.take(first)
-    moved = walk(charts, leader, to_frame(charts, leader.row, mean - at[first, :3]), carried=heading[first])
+    steps = to_frame(charts, leader.row, mean - from_here[first])
+    moved = walk(charts, leader, steps, carried=heading[first], stopping=False)
     turned = to_frame(charts, leader.row[group], to_space(charts, proposals.row, heading))
     # Directions a sixth of a turn apart mean the same lattice.
     six = (turned / np.maximum(np.abs(turned), 1e-300)) ** 6
@@ -177,5 +184,5 @@ def _agreed(
     own = heading[first] ** 6
     correction = np.exp(1j * np.angle(mean_six / own) / 6)
     pairs = close_pairs(crowd.where(moved.arrived), crowd.crowded * local[first])
-    kept = uncrowded(pairs, np.lexsort((np.arange(groups), -votes)).argsort())
+    kept = uncrowded(pairs, np.lexsort((np.arange(groups), -votes)).argsort()) & (moved.left == 0)
     return moved.arrived.take(kept), product(moved.carried, correction)[kept]

@@ -55,7 +55,7 @@ TURNS = (0.0, 15.0, 30.0, 45.0)
 # surface exactly.
 CRAMPED = 1.02
 # Rounds of relaxation and population control, and how many steps each may take; the last phases' steps.
-ROUNDS = 3
+ROUNDS, ROUNDS_GRADED = 3, 2
 STIFF_STEPS, LAST_ROUNDS = 45, 4
 NOT_SYMMETRIC = "The pattern is not symmetric: some of its features are placed by hand."
 
@@ -149,13 +149,12 @@ def _settled(
             "No bubble fits into the target region: it is narrower than one pitch everywhere; use a smaller "
             "pitch or a larger region."
         )
-    for number in range(ROUNDS):
+    for number in range(ROUNDS if ground.uniform is not None else ROUNDS_GRADED):
         yield Progress("Packing the bubbles", 0.2 + 0.2 * number)
         local = local_pitch(ground, bubbles)
         settle = relax_steps if packing.integrator == "fire" else integration_steps
-        # At one pitch everywhere, whoever comes or goes after the first round stirs but a few neighbours.
-        later = number > 0 and ground.uniform is not None
-        steps = max(packing.iterations // (2 if later else 1), 1)
+        # Whoever comes or goes after the first round stirs but a few neighbours.
+        steps = max(packing.iterations // (2 if number > 0 else 1), 1)
         settling = settle(ground, bubbles, filling(ground, bubbles, local), steps, packing.tolerance)
         bubbles, _ = yield from within(settling, 0.2 + 0.2 * number, 0.4 + 0.2 * number)
         bubbles, changed = control(ground, bubbles, local)
