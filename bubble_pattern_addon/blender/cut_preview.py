@@ -66,12 +66,8 @@ def show_cut(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     ):
         raise RegionError("The pattern is out of date: press Update before the cut is shown")
     pattern = read_pattern(obj, source.base.mesh)
-<<<<<<< HEAD
     stamp = stamp_of(recipe.feature, context)
     plan = drive(plan_steps(source.base.mesh, pattern, recipe.feature, stamp))
-=======
-    plan = drive(plan_steps(source.base.mesh, pattern, recipe.feature, stamp_of(recipe.feature, context)))
->>>>>>> live
     if not len(plan.cutters.mesh.triangles):
         raise RegionError("There is no feature that can be cut: Apply tells why")
     before = face_count(base, context)
