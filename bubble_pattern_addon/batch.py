@@ -44,7 +44,7 @@ from .core.solid import Part, part_steps
 from .core.solving import solving_steps
 from .core.soundness import sound_base
 from .core.surroundings import Surroundings
-from .core.units import millimetres_in
+from .core.units import millimetres_in, unit_of
 from .terminal import line_on, silenced
 
 EXAMPLE = """\
@@ -153,7 +153,11 @@ def recipe_for(base: LoadedBase, recipe_file: Path, region: Region | None = None
     the region.
     """
     fitting = Recipe() if region is None else default_recipe(region.area, region.perimeter)
-    return load_fitted_recipe(recipe_file, fitting, base.millimetres)
+    recipe = load_fitted_recipe(recipe_file, fitting, base.millimetres)
+    if recipe.output.unit is None and base.millimetres is not None:
+        # drills and the rules of processes go by the millimetre
+        recipe = replace(recipe, output=replace(recipe.output, unit=unit_of(base.millimetres)))
+    return recipe
 
 
 def draw(region: Region, pattern: Pattern, recipe: Recipe, millimetres: float) -> Drawing:

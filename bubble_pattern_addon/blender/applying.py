@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import bpy
 
-from ..core.errors import PatternError, RegionError
-from ..core.pattern import joined
+from ..core.errors import RegionError
+from ..core.feature_recipe import Feature
+from ..core.metric import end_to_end
+from ..core.pattern import Pattern, joined
 from ..core.progress import Progress, Steps
+from ..core.several import Layer, layered_steps
 from ..core.sides import check_one_side
-from ..core.solid import Part, Plan, cutting_seconds, part_steps
+from ..core.solid import Part, Plan, cutting_seconds
 from .feature_objects import stamp_of
-from .generation import show_part, update_steps
+from .generation import renewing_steps, show_part
 from .live import has_window
 from .part_mesh import build_part_mesh
 from .pattern_object import read_pattern
 from .properties import in_scene, pattern_objects
 from .provenance import Original, read_original
 from .reading import Base, evaluated_mesh, read_base, shown
-from .settings_recipe import is_outdated, recipe_of
+from .settings_recipe import is_outdated, part_text, recipe_of
 from .sources import read_source
 from .stepping import PATIENCE
 
@@ -31,33 +34,40 @@ def apply_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[tupl
     """
     base_object = obj.bubble_pattern.base
     owners = applied_with(obj)
-    feature = recipe_of(obj.bubble_pattern).feature
-    if any(recipe_of(owner.bubble_pattern).feature != feature for owner in owners):
-        raise PatternError(
-            f'The patterns on "{base_object.name}" have different features: give them the same ones, or '
-            "apply one, and add the other to the part"
-        )
     for owner in owners:
         settings = owner.bubble_pattern
-        source = read_source(base_object, settings.region, context, recipe_of(settings))
-        if feature.through:
+        recipe = recipe_of(settings)
+        source = read_source(base_object, settings.region, context, recipe)
+        if recipe.feature.through:
             check_one_side(source.base.mesh, source.selected)
         now = (source.fingerprint, source.size_trace)
         if now != (settings.fingerprint, settings.size_trace) or is_outdated(settings):
-            yield from update_steps(owner, context)
+            yield from renewing_steps(owner, context)
     base, original = read_whole(base_object, context)
-    pattern = joined([read_pattern(owner, base.mesh) for owner in owners])
-    if not len(pattern):
+    layers = layers_of(owners, base, context)
+    places = end_to_end([layer.pattern.places for layer in layers])
+    if not len(places):
         raise RegionError("The pattern has no features: make the pitch smaller or the region larger")
-    stamp = stamp_of(feature, context)
-    part = yield from part_steps(base.mesh, pattern, feature, stamp, is_long if has_window() else None)
+    part = yield from layered_steps(base.mesh, layers, is_long if has_window() else None)
     yield Progress("Building the part", 1.0)
     mesh = build_part_mesh(
-        f"{base_object.name} Part", part, pattern.places, base, original, obj.bubble_pattern.wall_material
+        f"{base_object.name} Part", part, places, base, original, obj.bubble_pattern.wall_material
     )
     for owner in owners:
         owner.bubble_pattern.part_removed = part.check.removed_volume
+        owner.bubble_pattern.part_made_with = part_text(owner.bubble_pattern)
     return place_part(base_object, owners, mesh, verdict_of(part), context), part
+
+
+def layers_of(owners: list[bpy.types.Object], base: Base, context: bpy.types.Context) -> list[Layer]:
+    """The patterns of all owners, those with the same features as one, in the order of the owners."""
+    alike: dict[Feature, list[Pattern]] = {}
+    for owner in owners:
+        feature = recipe_of(owner.bubble_pattern).feature
+        alike.setdefault(feature, []).append(read_pattern(owner, base.mesh))
+    return [
+        Layer(joined(patterns), feature, stamp_of(feature, context)) for feature, patterns in alike.items()
+    ]
 
 
 def applied_with(obj: bpy.types.Object) -> list[bpy.types.Object]:

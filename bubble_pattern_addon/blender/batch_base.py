@@ -17,7 +17,7 @@ import numpy as np
 
 from ..core.errors import BaseError, OutputError
 from ..core.field_tables import NO_NAMES, Wanted
-from ..core.files import LoadedBase, load_solids
+from ..core.files import LoadedBase, load_base, load_solids
 from ..core.mesh import Bools, Floats, Mesh
 from ..core.moving import moved_pattern, moved_recipe
 from ..core.quality import measure
@@ -166,8 +166,8 @@ def write_blend(path: Path, run: Run) -> None:
 
 
 def with_files_in(run: Run) -> Recipe:
-    """The recipe with the image and mesh files that it names taken into the open file, under names that fit
-    there.
+    """The recipe with the files that it names, images and meshes, taken into the open file, under names that
+    fit there.
     """
     names: dict[str, str] = {}
     for name in sorted(recipe_names(run.recipe).images):
@@ -179,7 +179,12 @@ def with_files_in(run: Run) -> Recipe:
             names[name] = image.name
     recipe = with_recipe_images(run.recipe, names)
     keep_outs = tuple(with_object(entry, run) for entry in recipe.region.keep_out)
-    return replace(recipe, region=replace(recipe.region, keep_out=keep_outs))
+    recipe = replace(recipe, region=replace(recipe.region, keep_out=keep_outs))
+    mesh = recipe.feature.mesh
+    if mesh is not None and (run.origin / mesh).is_file():
+        name = stand_aside(Path(mesh).stem, load_base(run.origin / mesh).mesh)
+        recipe = replace(recipe, feature=replace(recipe.feature, mesh=name))
+    return recipe
 
 
 def with_object(keep_out: KeepOut, run: Run) -> KeepOut:
@@ -187,12 +192,17 @@ def with_object(keep_out: KeepOut, run: Run) -> KeepOut:
     if keep_out.file is None:
         return keep_out
     [solid] = load_solids([keep_out.file], run.origin)["file", keep_out.file]
-    obj = bpy.data.objects.new(Path(keep_out.file).stem, mesh_of(solid.mesh))
+    return replace(keep_out, file=None, object=stand_aside(Path(keep_out.file).stem, solid.mesh))
+
+
+def stand_aside(name: str, body: Mesh) -> str:
+    """Put a mesh into the open file as a hidden object, and say what it is called there."""
+    obj = bpy.data.objects.new(name, mesh_of(body))
     bpy.context.scene.collection.objects.link(obj)
     obj.hide_render = True
     bpy.context.view_layer.update()
     obj.hide_set(True)
-    return replace(keep_out, file=None, object=obj.name)
+    return obj.name
 
 
 def write_picture(path: Path, run: Run, size: tuple[int, int] = SIZE, up: Floats | None = None) -> None:

@@ -1,4 +1,4 @@
-"""The cut shown before it is made: a Boolean modifier on the base, fed by the cutters of step 3.
+"""The part shown before it is made: a Boolean modifier on the base, fed by the solids of step 3.
 
 It is for the eye only. Whatever reads the base for the pattern switches it off first: it is never part of the
 base.
@@ -49,11 +49,12 @@ def toggle_cut(settings: Any, context: bpy.types.Context) -> None:
 
 
 def show_cut(obj: bpy.types.Object, context: bpy.types.Context) -> None:
-    """Show the base of the pattern `obj` with the holes that Apply would make.
+    """Show the base of the pattern `obj` with the features that Apply would make.
 
     Raises PatternError where there is nothing to cut, or Blender's modifier does not cut it.
     """
     from ..core.solid import plan_steps
+    from .feature_objects import stamp_of
     from .pattern_object import read_pattern
     from .sources import read_source
 
@@ -65,13 +66,14 @@ def show_cut(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     ):
         raise RegionError("The pattern is out of date: press Update before the cut is shown")
     pattern = read_pattern(obj, source.base.mesh)
-    plan = drive(plan_steps(source.base.mesh, pattern, recipe.feature))
+    stamp = stamp_of(recipe.feature, context)
+    plan = drive(plan_steps(source.base.mesh, pattern, recipe.feature, stamp))
     if not len(plan.cutters.mesh.triangles):
         raise RegionError("There is no feature that can be cut: Apply tells why")
     before = face_count(base, context)
     cutters = cutters_object(obj, plan.cutters.mesh)
     modifier = base.modifiers.new(MODIFIER, 'BOOLEAN')
-    modifier.operation = 'DIFFERENCE'
+    modifier.operation = 'UNION' if recipe.feature.adds else 'DIFFERENCE'
     modifier.object = cutters
     modifier.show_expanded = False
     obj.hide_set(True)  # its discs would fill the holes

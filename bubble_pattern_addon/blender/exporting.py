@@ -109,8 +109,11 @@ def laid(obj: bpy.types.Object, context: bpy.types.Context) -> tuple[Region, Pat
     now = (source.fingerprint, source.size_trace)
     if now != (settings.fingerprint, settings.size_trace) or is_outdated(settings):
         raise OutputError(f'"{obj.name}" is out of date: press Update first')
-    base, frame = source.region.base, source.base.frame
-    region = replace(source.region, base=Mesh(transformed(base.vertices, frame), base.triangles))
+    region, frame = source.region, source.base.frame
+    base, own = (
+        Mesh(transformed(mesh.vertices, frame), mesh.triangles) for mesh in (region.base, region.mesh)
+    )
+    region = replace(region, base=base, mesh=own)
     pattern = moved_pattern(read_pattern(obj, source.base.mesh), frame)
     return region, pattern, scene_millimetres(context.scene) or 1.0
 

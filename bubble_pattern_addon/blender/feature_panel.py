@@ -69,7 +69,7 @@ def draw_bump(column: bpy.types.UILayout, settings: Any) -> None:
 
 def draw_walls(column: bpy.types.UILayout, settings: Any) -> None:
     """Draw rim and draft."""
-    column.row().prop(settings, "rim", expand=True)
+    column.prop(settings, "rim")
     if settings.rim != 'SHARP':
         column.prop(settings, "rim_size", text="Size")
     if settings.rim == 'CHAMFER':
@@ -95,6 +95,7 @@ class BUBBLE_PATTERN_PT_feature_turn(FeaturePart, bpy.types.Panel):
 
     bl_label = "Turn"
     bl_order = 1
+    bl_options = set()  # what is not round is turned more often than not
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

@@ -16,6 +16,8 @@ from bpy.props import (
     StringProperty,
 )
 
+from ..core.feature_recipe import BUMP_HEIGHT, DIMPLE_DEPTH, RIM_SIZE
+from ..core.recipe import neat
 from .field_properties import SIZE, BubblePatternField, length_property
 from .reacting import reshape_feature
 
@@ -25,6 +27,18 @@ def outline_changed(settings: bpy.types.PropertyGroup, context: bpy.types.Contex
     from .feature_objects import take_outline
 
     take_outline(settings, context)
+    reshape_feature(settings, context)
+
+
+def choice_changed(settings: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    """Another kind or rim was chosen: let its size start from one that suits the diameter."""
+    start = {"height": BUMP_HEIGHT, "dimple_depth": DIMPLE_DEPTH, "rim_size": RIM_SIZE}
+    used = {'BUMP': "height", 'DIMPLE': "dimple_depth"}.get(settings.kind)
+    for name in (used, "rim_size" if settings.rim != 'SHARP' else None):
+        if name is not None and settings.live and settings.made_with and not getattr(settings, name):
+            settings.live = False
+            setattr(settings, name, neat(start[name] * settings.diameter))
+            settings.live = True
     reshape_feature(settings, context)
 
 
@@ -68,7 +82,7 @@ class FeatureSettings:
             ('BUMP', "Bump", "Something that stands on the surface, as for a grip"),
         ),
         default='HOLE',
-        update=reshape_feature,
+        update=choice_changed,
     )
     form: EnumProperty(
         name="Form",
@@ -134,7 +148,7 @@ class FeatureSettings:
             ('FILLET', "Fillet", "A rounding"),
         ),
         default='SHARP',
-        update=reshape_feature,
+        update=choice_changed,
     )
     rim_size: length_property(
         name="Rim Size",

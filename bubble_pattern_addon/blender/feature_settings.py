@@ -64,8 +64,8 @@ def _named(settings: Any, feature: Feature) -> Feature:
         points = json.loads(settings.profile_points or "[]")
         if not points and settings.profile_curve is not None:
             raise RecipeError(
-                f'[feature] profile: "{settings.profile_curve.name}" is not one closed loop: close the curve, '
-                "or use one with a single outline"
+                f'[feature] profile: "{settings.profile_curve.name}" is not one closed loop: close the '
+                "curve, or use one with a single outline"
             )
         if not points:
             raise RecipeError("[feature] profile follows a closed curve: choose one")

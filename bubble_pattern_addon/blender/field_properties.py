@@ -28,7 +28,7 @@ def length_property(name: str, description: str, default: float = 0.0, **options
         description=description,
         subtype='DISTANCE',
         default=default,
-        step=0.002,  # in hundredths of a meter: the mouse drags by a few tenths of a millimeter
+        step=0.01,  # in hundredths of a meter: a tenth of a millimeter; the mouse drags finer, too
         precision=4,
         **options,
     )

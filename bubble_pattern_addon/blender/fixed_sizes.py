@@ -59,7 +59,7 @@ def shape(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     if generation.is_only_shape(obj.bubble_pattern):
         generation.reshape(obj, context)
     else:
-        drive(generation.update_steps(obj, context))
+        drive(generation.renewing_steps(obj, context))
 
 
 def keep(settings: Any, seeds: list[tuple[Any, float]]) -> None:

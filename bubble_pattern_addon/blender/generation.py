@@ -24,6 +24,7 @@ from ..core.region import Region
 from ..core.results import Results, results_of
 from ..core.shaping import reshaped
 from . import live
+from .cut_preview import hide_cut
 from .noting import note_quality, note_results, noted_quality
 from .pattern_object import read_pattern, write_pattern, write_sizes
 from .preview_nodes import show_preview
@@ -33,6 +34,10 @@ from .sources import Source, read_source
 
 # Without a window, a pattern that took longer than this is not laid anew at every change of a setting.
 LIVE_SECONDS = 1.0
+HAND_MADE = (
+    "The {} has changed since the features were settled by hand: update the pattern, which keeps only those "
+    "that are pinned"
+)
 
 
 @dataclass(frozen=True)
@@ -124,9 +129,22 @@ def update_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[Non
     put(obj, source, recipe, laid)
 
 
+def renewing_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[None]:
+    """Bring the pattern up to date by itself. Raises PatternError where hand work would be lost by it."""
+    settings = obj.bubble_pattern
+    if not settings.hand_made:
+        yield from update_steps(obj, context)
+    elif is_only_shape(settings):
+        reshape(obj, context)
+    else:
+        raise PatternError(HAND_MADE.format("packing"))
+
+
 def react(settings: Any, context: bpy.types.Context, repack: bool) -> None:
     """Answer a change of a setting in the panel: lay or shape the pattern anew; see live."""
     obj = settings.id_data
+    if settings.cut_preview and in_scene(settings.base):
+        hide_cut(settings.base)
     if not answers(settings, context) or live.is_taken_up(obj):
         return
     if settings.hand_made and (repack or not is_only_shape(settings)):
@@ -169,10 +187,7 @@ def reshape(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     source = read_source(settings.base, settings.region, context, recipe)
     if source.fingerprint != settings.fingerprint:
         if settings.hand_made:
-            raise PatternError(
-                "The base has changed since the features were settled by hand: update the pattern, which "
-                "keeps only those that are pinned"
-            )
+            raise PatternError(HAND_MADE.format("base"))
         drive(update_steps(obj, context))
         return
     pattern = reshaped(read_pattern(obj, source.base.mesh), source.region, recipe, source.surroundings)

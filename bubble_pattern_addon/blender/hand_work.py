@@ -18,7 +18,6 @@ from ..core.mesh import Bools
 from ..core.progress import drive
 from .attributes import read_values, write_values
 from .edit_undo import take_all_back
-from .field_properties import point_of
 from .operators import current_pattern, poll_pattern, refused
 from .point_marks import PINNED, keep_pins, laid_places, pinned_points
 from .properties import is_pattern
@@ -191,7 +190,7 @@ def settle(obj: bpy.types.Object, context: bpy.types.Context, fill_voids: bool, 
     steps = settle_steps(before, hand, source.region, recipe, source.surroundings, fill_voids)
     pattern, stay = drive(steps)
     keep_pins(settings, stay)
-    recipe = replace(recipe, packing=replace(recipe.packing, pins=tuple(point_of(at) for at in stay)))
+    recipe = recipe_of(settings)
     quality = measure(pattern, source.region)
     by_hand = settings.hand_made or touched
     laid = replace(generation.measured(pattern, source.region, recipe, quality), seconds=settings.seconds)

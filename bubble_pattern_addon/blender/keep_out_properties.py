@@ -145,6 +145,16 @@ def is_given(entry: Any) -> bool:
     return entry.kind in SHAPES or bool(getattr(entry, entry.kind.lower()))
 
 
+def keep_out_objects(settings: Any) -> list[bpy.types.Object]:
+    """The objects that are kept out, those of collections among them."""
+    entries = [entry for entry in settings.keep_out if is_given(entry)]
+    objects = [entry.object for entry in entries if entry.kind == 'OBJECT']
+    for entry in entries:
+        if entry.kind == 'COLLECTION':
+            objects += entry.collection.all_objects
+    return objects
+
+
 def keep_out_of(entry: Any) -> KeepOut:
     """The recipe's entry."""
     key = entry.kind.lower()

@@ -27,6 +27,7 @@ from .reading import Base, evaluated_mesh, shown, transformed
 from .sidebar import SettingsPanel, columns, sentences, shown_settings
 from .surroundings import SOLID_TYPES
 from .target_region import selected_faces, store, stored
+from .watching import stamp_of
 
 if TYPE_CHECKING:
     from ..core.region import Region
@@ -73,6 +74,7 @@ def solid_of(obj: bpy.types.Object, to_frame: Floats, context: bpy.types.Context
     """The faces of an object with its modifiers, in the frame that `to_frame` (4, 4) leads to from the
     world.
     """
+    stamp_of(obj)  # from now on its changes are heard of
     matrix = to_frame @ np.array(obj.matrix_world, dtype=np.float64)
     axis = matrix[:3, 2]
     if not np.linalg.norm(axis) > 0 or obj.type not in SOLID_TYPES:

@@ -21,6 +21,7 @@ from ..core.errors import PatternError
 from ..core.progress import Steps
 from . import runs, watching
 from .cut_preview import cut_modifiers
+from .keep_out_properties import keep_out_objects
 from .properties import in_scene, is_pattern, pattern_of
 from .settings_recipe import is_outdated, recipe_of, spoken
 from .stepping import PATIENCE, REST
@@ -155,7 +156,8 @@ def look() -> None:
     later: set[int] = set()
     for obj, context in patterns_shown():
         base = obj.bubble_pattern.base
-        if base.session_uid not in numbers:
+        stands_on = {base, *keep_out_objects(obj.bubble_pattern)}
+        if not numbers & {other.session_uid for other in stands_on}:
             continue
         if not can_be_looked_at(base):
             later.add(base.session_uid)
@@ -210,7 +212,7 @@ def judge(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     else:
         now = (source.fingerprint, source.size_trace)
         changed = now != (settings.fingerprint, settings.size_trace)
-        trouble = "The base has changed: Update lays the pattern anew" if changed else ""
+        trouble = "The base has changed, or a keep-out: Update lays the pattern anew" if changed else ""
     stamp = watching.stamp_of(settings.base)
     if stamp is not None:
         _live.verdicts[obj.session_uid] = Verdict(stamp, trouble)

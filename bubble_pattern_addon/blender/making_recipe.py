@@ -10,8 +10,9 @@ from ..core.errors import RecipeError
 from ..core.nominal import SERIES
 from ..core.processes import PROCESSES
 from ..core.recipe import Limits, Output, Recipe, Solve
-from ..core.units import Unit
+from ..core.units import Unit, unit_of
 from .field_properties import typed
+from .units import scene_millimetres
 
 PROCESS_WORDS = {word.upper().replace(" ", "_"): word for word in PROCESSES}
 SERIES_WORDS = {word.upper().replace(" ", "_").replace(".", ""): word for word in SERIES}
@@ -94,8 +95,7 @@ def solve_of(settings: Any) -> Solve:
 
 def scene_unit() -> Unit:
     """The unit of the scene's lengths, for the recipe."""
-    scale = typed(bpy.context.scene.unit_settings.scale_length)
-    return "m" if scale == 1.0 else float(f"{1000 * scale:.7g}")
+    return unit_of(scene_millimetres(bpy.context.scene) or 1.0)
 
 
 def _reference() -> tuple[str, float]:

@@ -51,7 +51,6 @@ def note_results(settings: Any, pattern: Pattern, results: Results) -> None:
     settings.smallest, settings.largest = known(results.smallest), known(results.largest)
     settings.open_area = results.open_area
     settings.removed = known(results.removed)
-    settings.part_removed = -1.0
     settings.nominal = ";".join(f"{size:.9g},{count}" for size, count in results.sizes)
     settings.broken.clear()
     for one in results.broken:

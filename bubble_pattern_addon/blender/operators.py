@@ -12,6 +12,7 @@ import bpy
 from bpy.props import BoolProperty, FloatProperty
 
 from ..core.errors import PatternError
+from ..core.feature_recipe import nouns
 from ..core.progress import Progress, Steps
 from .cut_preview import hide_cut
 from .field_properties import length_property, typed
@@ -68,6 +69,23 @@ class OnPattern:
         return poll_pattern(cls, context) and poll_object_mode(cls, context)
 
 
+class AnewOperator(SteppedOperator):
+    """Mixin for an operator that lays the current pattern anew: it asks before hand work is thrown away."""
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Ask where there is something to lose, or work at once."""
+        if not current_pattern(context).bubble_pattern.hand_made:
+            return super().invoke(context, event)
+        return context.window_manager.invoke_confirm(  # type: ignore[no-any-return]
+            self,
+            event,
+            title="Lay the pattern anew?",
+            message="It was settled by hand. Only pinned features will stay where they are.",
+            confirm_text="Lay Anew",
+            icon='WARNING',
+        )
+
+
 class LayingOperator(SteppedOperator):
     """Mixin for an operator that lays a pattern: its steps end with the pattern's object."""
 
@@ -85,7 +103,7 @@ class LayingOperator(SteppedOperator):
 
 
 class BUBBLE_PATTERN_OT_add(LayingOperator, bpy.types.Operator):
-    """Fill the selected faces with a tight pattern of holes; in Object Mode all faces or those marked"""
+    """Fill the selected faces with a tight pattern of features; in Object Mode all faces or those marked"""
 
     bl_idname = "bubble_pattern.add"
     bl_label = "Add Pattern"
@@ -164,7 +182,7 @@ class BUBBLE_PATTERN_OT_add(LayingOperator, bpy.types.Operator):
         self.pitch = settings.pitch
 
 
-class BUBBLE_PATTERN_OT_update(OnPattern, LayingOperator, bpy.types.Operator):
+class BUBBLE_PATTERN_OT_update(OnPattern, AnewOperator, LayingOperator, bpy.types.Operator):
     """Lay the pattern anew by its settings, on the base as it is now"""
 
     bl_idname = "bubble_pattern.update"
@@ -177,20 +195,6 @@ class BUBBLE_PATTERN_OT_update(OnPattern, LayingOperator, bpy.types.Operator):
         description="A setting has changed; what is wrong with it stands in the sidebar",
         options={'HIDDEN', 'SKIP_SAVE'},
     )
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Ask before hand work is thrown away."""
-        settings = current_pattern(context).bubble_pattern
-        if not settings.hand_made:
-            return super().invoke(context, event)
-        return context.window_manager.invoke_confirm(  # type: ignore[no-any-return]
-            self,
-            event,
-            title="Lay the pattern anew?",
-            message="It was settled by hand. Only pinned features will stay where they are.",
-            confirm_text="Update",
-            icon='WARNING',
-        )
 
     def about(self, context: bpy.types.Context) -> int:
         number: int = current_pattern(context).session_uid
@@ -214,7 +218,7 @@ class BUBBLE_PATTERN_OT_update(OnPattern, LayingOperator, bpy.types.Operator):
 
 
 class BUBBLE_PATTERN_OT_apply(OnPattern, SteppedOperator, bpy.types.Operator):
-    """Make the finished part, a solid with the holes, in place of the base, which is kept, hidden"""
+    """Make the finished part, a solid with the features, in place of the base, which is kept, hidden"""
 
     bl_idname = "bubble_pattern.apply"
     bl_label = "Apply"
@@ -233,10 +237,11 @@ class BUBBLE_PATTERN_OT_apply(OnPattern, SteppedOperator, bpy.types.Operator):
         if check.problems:
             self.report({'WARNING'}, " ".join(check.problems))
         else:
-            holes = (
-                f"{check.through:,} through-holes" if check.through else f"{len(part.pierced):,} blind holes"
-            )
-            self.report({'INFO'}, f"Watertight part with {holes}")
+            what = {"hole": "blind hole"}.get(part.kind, part.kind)
+            if part.kind == "hole" and check.through:
+                what = "through-hole"
+            made = f"Watertight part with {nouns(what, len(part.pierced))}"
+            self.report({'WARNING' if part.undercut.any() else 'INFO'}, " ".join([f"{made}.", *check.notes]))
 
 
 class BUBBLE_PATTERN_OT_edit(OnPattern, bpy.types.Operator):

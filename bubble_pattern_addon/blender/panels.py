@@ -6,6 +6,7 @@ from typing import Any
 
 import bpy
 
+from ..core.feature_recipe import nouns
 from . import (
     feature_panel,
     limits_panel,
@@ -122,7 +123,8 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
         if settings.verdict:
             sentences(layout, settings.verdict, context.region.width, 'ERROR')
         else:
-            layout.label(text=f"{settings.count:,} holes, watertight", icon='CHECKMARK')
+            layout.label(text=f"{nouns(settings.kind.lower(), settings.count)}, watertight", icon='CHECKMARK')
+        result_panel.draw_table(layout, result_panel.removed_figures(context, settings))
         large(layout).operator("bubble_pattern.edit", icon='GREASEPENCIL')
         draw_files(layout)
         layout.operator("bubble_pattern.remove", icon='TRASH')

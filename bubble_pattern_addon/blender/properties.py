@@ -68,7 +68,7 @@ class BubblePatternSettings(
     )
     cut_preview: BoolProperty(
         name="Cut Preview",
-        description="Show the base with its holes before they are made, until a setting or the base changes",
+        description="Show the base with its features before they are made, until a setting changes",
         default=False,
         options={'SKIP_SAVE'},
         update=show_cut,

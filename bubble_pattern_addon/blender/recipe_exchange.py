@@ -22,6 +22,7 @@ from ..core.recipe_units import fitted_recipe, recipe_in
 from ..core.units import unit_of
 from .reading import world_frame
 from .settings_recipe import recipe_of, take_recipe
+from .solving import target_steps
 from .units import scene_millimetres
 
 # A recipe that would lay more features than this is taken for one in another unit.
@@ -52,17 +53,21 @@ def recipe_to_share(obj: bpy.types.Object, context: bpy.types.Context) -> str:
     spelled = (
         "units of Blender" if unit is None else unit if isinstance(unit, str) else f"units of {unit:g} mm"
     )
-    return LINE.format(unit=spelled) + recipe_to_toml(replace(recipe, output=Output(unit=unit)))
+    return LINE.format(unit=spelled) + recipe_to_toml(
+        replace(recipe, output=replace(recipe.output, unit=unit))
+    )
 
 
 def preset_text(obj: bpy.types.Object, context: bpy.types.Context) -> str:
     """The recipe of the pattern `obj` in millimetres, without what belongs to its part alone: the region,
-    fixed sizes, the rows' direction, a point of symmetry.
+    fixed sizes and pins, the rows' direction, a point of symmetry.
     """
     recipe = recipe_of(obj.bubble_pattern)
     packing = recipe.packing
     given = isinstance(packing.orientation, str)
-    packing = replace(packing, orientation=packing.orientation if given else "edge", symmetry_centre=None)
+    packing = replace(
+        packing, orientation=packing.orientation if given else "edge", symmetry_centre=None, pins=()
+    )
     recipe = replace(
         recipe,
         region=RegionChoice(),
@@ -113,7 +118,10 @@ def adopt_steps(
     laid = False
     try:
         take_recipe(obj.bubble_pattern, recipe)
-        yield from generation.update_steps(obj, context)
+        if recipe.solve:
+            yield from target_steps(obj, context, replace(recipe_of(obj.bubble_pattern), solve=recipe.solve))
+        else:
+            yield from generation.update_steps(obj, context)
         laid = True
     finally:
         if not laid and before is not None:

@@ -10,7 +10,7 @@ from ..core.density import mass
 from ..core.units import millimetres_in
 from .making_recipe import scene_unit
 from .recipe_operators import draw_files
-from .settings_recipe import is_outdated, length_text
+from .settings_recipe import is_outdated, length_text, part_text
 from .sidebar import SettingsPanel, columns, sentences, shown_settings
 
 # More nominal sizes than this are only counted.
@@ -114,16 +114,16 @@ def nominal_rows(context: bpy.types.Context, settings: Any) -> list[tuple[str, s
 
 
 def removed_figures(context: bpy.types.Context, settings: Any) -> list[Figure]:
-    """The volume that the features take away, and its mass: estimated before Apply, exact after."""
-    exact = settings.part_removed >= 0
+    """The volume that the features take away or add, and its mass: estimated before Apply, exact after."""
+    exact = bool(settings.part_made_with) and settings.part_made_with == part_text(settings)
+    if not exact and settings.removed < 0:
+        return []  # not known
     volume = settings.part_removed if exact else settings.removed
-    if volume < 0:
-        return []
-    about = "" if exact else "≈ "
-    figures = [Figure("Removed", about + volume_text(context, volume))]
+    about, what = "" if exact else "≈ ", "Added" if volume < 0 else "Removed"
+    figures = [Figure(what, about + volume_text(context, abs(volume)))]
     if settings.density > 0:
-        grams = mass(volume, settings.density, 1 / millimetres_in(scene_unit()))
-        figures.append(Figure("Mass Removed", about + mass_text(context, grams)))
+        grams = mass(abs(volume), settings.density, 1 / millimetres_in(scene_unit()))
+        figures.append(Figure(f"Mass {what}", about + mass_text(context, grams)))
     return figures
 
 

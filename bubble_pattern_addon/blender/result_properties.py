@@ -65,8 +65,11 @@ class ResultSettings:
     largest: FloatProperty(default=-1.0, options={'HIDDEN'})
     open_area: FloatProperty(name="Open Area", options={'HIDDEN'})
     removed: FloatProperty(default=-1.0, options={'HIDDEN'})
-    """Volume: estimated, or that of the part where part_removed says so."""
-    part_removed: FloatProperty(default=-1.0, options={'HIDDEN'})
+    """Volume as estimated; while part_made_with holds, the part itself tells it: part_removed, below 0 where
+    bumps add.
+    """
+    part_removed: FloatProperty(options={'HIDDEN'})
+    part_made_with: StringProperty(options={'HIDDEN'})
     nominal: StringProperty(options={'HIDDEN'})
     broken: CollectionProperty(type=BubblePatternBroken, options={'HIDDEN'})
     verdict: StringProperty(options={'HIDDEN'})

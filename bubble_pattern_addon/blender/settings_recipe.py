@@ -158,11 +158,21 @@ def packing_text(recipe: Recipe) -> str:
 
 def recipe_text(recipe: Recipe) -> str:
     """What the pattern's points depend on, as text; how the features are cut is left out."""
-    # the rules of a process depend on how deep a feature is
     feature = placing(recipe.feature)
     if recipe.limits.process is not None:
-        feature = replace(feature, depth=recipe.feature.depth)
+        # its rules depend on how deep and how steep a feature is
+        feature = replace(feature, depth=recipe.feature.depth, draft=recipe.feature.draft)
     return recipe_to_toml(replace(recipe, feature=feature, output=shaping_output(recipe)))
+
+
+def part_text(settings: Any) -> str:
+    """What a part made of this pattern depends on, as text; nothing where the settings make no sense."""
+    try:
+        recipe = recipe_of(settings)
+    except RecipeError:
+        return ""
+    shape = recipe_to_toml(replace(recipe, output=shaping_output(recipe)))
+    return "\n".join([shape, settings.made_with, settings.fingerprint, settings.size_trace])
 
 
 def is_outdated(settings: Any) -> bool:

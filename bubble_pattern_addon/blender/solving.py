@@ -8,13 +8,37 @@ from typing import Any
 import bpy
 
 from ..core.progress import Progress, Steps, within
+from ..core.recipe import Recipe
 from .making_recipe import solve_of
-from .operators import OnPattern, current_pattern
+from .operators import AnewOperator, OnPattern, current_pattern
 from .settings_recipe import length_text, recipe_of, take_packing, take_shaping
-from .stepping import SteppedOperator
 
 
-class BUBBLE_PATTERN_OT_solve(OnPattern, SteppedOperator, bpy.types.Operator):
+def target_steps(obj: bpy.types.Object, context: bpy.types.Context, recipe: Recipe) -> Steps[Any]:
+    """Lay the pattern `obj` so that it meets the target of `recipe`, which its settings say but for the
+    target; what was found, as core.solving tells it.
+    """
+    from ..core.quality import measure
+    from ..core.solving import solving_steps
+    from . import generation
+    from .sources import read_source
+
+    yield Progress("Reading the base", 0.0)
+    settings = obj.bubble_pattern
+    source = read_source(settings.base, settings.region, context, recipe)
+    solving = solving_steps(source.region, recipe, source.surroundings)
+    solved, seconds = yield from generation.timed(within(solving, 0.0, 0.95))
+    yield Progress("Measuring", 0.95)
+    pattern, region = solved.pattern, source.region
+    laid = generation.measured(pattern, region, solved.recipe, measure(pattern, region))
+    laid = replace(laid, seconds=seconds / solved.packings)
+    settings = obj.bubble_pattern  # asked for anew after the pauses
+    take_found(settings, solved)
+    generation.put(obj, source, recipe_of(settings), laid)
+    return solved
+
+
+class BUBBLE_PATTERN_OT_solve(OnPattern, AnewOperator, bpy.types.Operator):
     """Find the diameter or the pitch at which the pattern comes to the target"""
 
     bl_idname = "bubble_pattern.solve"
@@ -22,26 +46,9 @@ class BUBBLE_PATTERN_OT_solve(OnPattern, SteppedOperator, bpy.types.Operator):
     bl_options = {'REGISTER', 'UNDO'}
 
     def steps(self, context: bpy.types.Context) -> Steps[Any]:
-        from ..core.quality import measure
-        from ..core.solving import solving_steps
-        from . import generation
-        from .sources import read_source
-
-        yield Progress("Reading the base", 0.0)
         obj = current_pattern(context)
         settings = obj.bubble_pattern
-        recipe = recipe_of(settings)
-        source = read_source(settings.base, settings.region, context, recipe)
-        asked = replace(recipe, solve=solve_of(settings))
-        solving = solving_steps(source.region, asked, source.surroundings)
-        solved, seconds = yield from generation.timed(within(solving, 0.0, 0.95))
-        yield Progress("Measuring", 0.95)
-        pattern, region = solved.pattern, source.region
-        quality = measure(pattern, region)
-        laid = generation.measured(pattern, region, solved.recipe, quality)
-        laid = replace(laid, seconds=seconds / solved.packings)
-        take_found(settings, solved)
-        generation.put(obj, source, recipe_of(settings), laid)
+        solved = yield from target_steps(obj, context, replace(recipe_of(settings), solve=solve_of(settings)))
         return obj, solved
 
     def done(self, context: bpy.types.Context, result: Any) -> None:

@@ -153,6 +153,7 @@ class SteppedOperator:
         if self._outcome is None:
             others = time.perf_counter() - self._worked
             self._outcome = self.advance(context, min(max(SLICE, others), LONGEST_SLICE))
+            self._mode = context.mode  # the work itself may leave Edit Mode for a while
             self._moved = not self.may_be_dragged()
             self.show(context)
             self._worked = time.perf_counter()

@@ -17,8 +17,8 @@ from .errors import RegionError
 from .flattening import Flat, flatten
 from .mesh import Bools, Floats, Ints
 from .pattern import Pattern, take
-from .region import Region, boundary_loops, make_region
-from .surface import Charts, Complex, make_charts, to_frame
+from .region import Region, boundary_loops, region_of
+from .surface import Charts, Complex, make_charts, on_region, to_frame
 from .toml_values import Point
 
 # Of the drawing's size: what stays free between parts that are laid flat side by side.
@@ -194,12 +194,11 @@ def _row_angle(along: Complex) -> float:
 
 
 def _laid_flat(region: Region, pattern: Pattern, align: str, shapes: Shapes) -> Drawing:
-    selected = np.zeros(len(region.base.triangles), dtype=bool)
-    selected[region.triangles] = True
-    whole = make_region(region.base, selected)  # without the borders between its sub-regions
+    # without the borders between its sub-regions
+    whole = region_of(region.base, region.mesh, region.triangles, None, 0.0, region.within)
     charts = make_charts(whole)
     flat = flatten(whole)
-    row = np.searchsorted(whole.triangles, pattern.places.triangle)
+    row, barycentric = on_region(whole, pattern.places)
     turn = _turns(charts, flat.corners)
     heading = to_frame(charts, row, shapes.heading) * turn[row]
     heading /= np.maximum(np.abs(heading), 1e-300)
@@ -210,7 +209,7 @@ def _laid_flat(region: Region, pattern: Pattern, align: str, shapes: Shapes) -> 
             -1j * _row_angles(rows * upright[flat.part[row]], flat.part[row], len(upright))
         )
     corners = _side_by_side(flat.corners * upright[flat.part][:, None], flat.part)
-    centre = np.einsum("nk,nk->n", pattern.places.barycentric, corners[row])
+    centre = np.einsum("nk,nk->n", barycentric, corners[row])
     _refuse_overlap(centre, pattern)
     heading = heading * upright[flat.part[row]]
     outlines = None
@@ -336,8 +335,7 @@ def _reaching(centre: Floats, diameter: Floats, cuts: tuple[Line, ...]) -> int:
 def _lines(region: Region, corners: Complex, cuts: Bools) -> tuple[tuple[Line, ...], tuple[Line, ...]]:
     """The boundary's lines, and those of the cuts, when the triangles' corners lie at `corners` (R, 3)."""
     neighbours, opposite = np.where(cuts, -1, region.neighbours), np.where(cuts, -1, region.opposite)
-    rows = region.base.triangles[region.triangles]
-    loops, rim = boundary_loops(rows, neighbours, opposite)
+    loops, rim = boundary_loops(region.mesh.triangles, neighbours, opposite)
     row, corner = rim.T
     start, end = corners[row, (corner + 1) % 3], corners[row, (corner + 2) % 3]
     is_cut = cuts[row, corner]

@@ -84,13 +84,13 @@ def make_report(
 ) -> dict[str, Any]:
     """The figures of a run in the unit of the base, ready for JSON; one with nothing to measure is None.
 
-    kind (of the features), features, watertight, genus, volume, open_area, min_web, min_margin,
-    quality{six, psi6, gap_cv, gap_min, rim_cv, void} and seconds{region, pack, shape, add}; further
-    symmetry, the recipe's word for the one that the pattern has, or "off", kept_out_area, what keep-outs
-    have taken from the region, wall{min, max}, the near wall's thickness at the features, limits (see
-    limits_report), undercut and undercut_ids, features that cannot be drawn off along the pull, problems,
-    one sentence each, empty when the part is good, and notes, likewise, on what does no harm; with the
-    recipe, what results_report adds.
+    kind (of the features), features, watertight, genus, volume, open_area, min_web, min_margin, quality{six,
+    psi6, gap_cv, gap_min, rim_cv, void} and seconds{region, pack, shape, add}; further symmetry, the
+    recipe's word for the one that the pattern has, or "off", kept_out_area, what keep-outs have taken from
+    the region, wall{min, max}, the near wall's thickness at the features, limits (see limits_report),
+    undercut and undercut_ids, features that cannot be drawn off along the pull, problems, one sentence each,
+    empty when the part is good, and notes, likewise, on what does no harm; with the recipe, what
+    results_report adds.
     """
     figures: Quality = measure(pattern, region)
     thickness = part.thickness[np.isfinite(part.thickness)]

@@ -8,6 +8,7 @@ and back. Bound to its surroundings (the region, what is painted on the base, im
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
@@ -35,6 +36,16 @@ class Places:
 
     def __len__(self) -> int:
         return len(self.position)
+
+
+def end_to_end(parts: Sequence[Places]) -> Places:
+    """Places one after the other."""
+    return Places(
+        *(
+            np.concatenate([getattr(part, name) for part in parts])
+            for name in ("position", "triangle", "barycentric")
+        )
+    )
 
 
 class Field(Protocol):

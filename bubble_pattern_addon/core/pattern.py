@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .mesh import Bools, Floats, Ints
-from .metric import Places
+from .metric import Places, end_to_end
 
 COLUMNS = ("normal", "tangent", "pitch", "diameter", "row")
 
@@ -142,15 +142,13 @@ def _end_to_end(parts: Sequence[Pattern]) -> Pattern:
     def column(name: str) -> Any:
         return np.concatenate([getattr(part, name) for part in parts])
 
-    places = [part.places for part in parts]
-    names = ("position", "triangle", "barycentric")
     # Parts with different symmetries, or one without, have none together.
     words = {None if part.partners is None else part.symmetry for part in parts}
     symmetric = len(words) == 1 and None not in words
     known = any(part.wished is not None for part in parts)
     wished = [part.diameter if part.wished is None else part.wished for part in parts]
     return Pattern(
-        Places(*(np.concatenate([getattr(place, name) for place in places]) for name in names)),
+        end_to_end([part.places for part in parts]),
         **{name: column(name) for name in COLUMNS},
         wished=np.concatenate(wished) if known else None,
         bubble=column("ids"),

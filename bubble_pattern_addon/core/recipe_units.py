@@ -24,6 +24,7 @@ LENGTHS = {
     "shaping": ("diameter", "seeds", "sizes"),
     "feature": ("depth", "height", "tolerance", "rim_size", "turn_point"),
     "limits": ("min_web", "min_margin", "min_diameter", "thickness"),
+    "solve": (),
     "output": (),
 }
 # To so many digits: 1.2 mm are 0.0012 m, not 0.0011999999999999999.
@@ -41,8 +42,11 @@ def fitted_recipe(data: Mapping[str, Any], fitting: Recipe, millimetres: float |
     their unit, or the base does not, the lengths are taken as they are. RecipeError: see recipe_file.
     """
     output = data.get("output", {})
-    if millimetres is None or not isinstance(output, Mapping) or "unit" not in output:
+    if millimetres is None or not isinstance(output, Mapping):
         return recipe_from_dict(data, fitting)
+    if "unit" not in output:
+        recipe = recipe_from_dict(data, fitting)
+        return replace(recipe, output=replace(recipe.output, unit=unit_of(millimetres)))
     given, unit = read_unit(output["unit"], "[output] unit"), unit_of(millimetres)
     return recipe_in(recipe_from_dict(data, recipe_in(fitting, given, unit, 17)), unit, given)
 

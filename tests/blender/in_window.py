@@ -1,14 +1,20 @@
-"""Run by a real Blender with a window (see test_window.py): add, cancel, apply; then say what was found."""
+"""Run by a real Blender with a window (see test_window.py): a designer selects faces, adds a pattern, edits
+it twice, takes one edit back, cancels, applies and exports; then say what was found.
+"""
 
 from __future__ import annotations
 
+import importlib
 import json
+import os
 import sys
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from pathlib import Path
+from types import ModuleType
 
+import bmesh
 import bpy
 
 sys.path.append(str(Path(__file__).parent))
@@ -48,17 +54,25 @@ def pressed(name: str) -> set[str]:
 
 
 def dome() -> bpy.types.Object:
-    """A smooth, gently domed plate with a target region marked on its front."""
+    """A smooth, gently domed plate."""
     for old in list(bpy.data.objects):
         bpy.data.objects.remove(old)
     base = sheet(cells=40)
     base.data.shade_smooth()
     base.modifiers.new("Wall", 'SOLIDIFY').thickness = 0.003
     bpy.ops.object.modifier_apply(modifier="Wall")
-    marked = base.data.attributes.new("bubble_region", 'BOOLEAN', 'FACE')
-    front = [face.normal.z > 0.5 and face.center.xy.length < 0.08 for face in base.data.polygons]
-    marked.data.foreach_set("value", front)
     return base
+
+
+def front_selected(base: bpy.types.Object) -> None:
+    """Go into Edit Mode and select a round region on the front of the plate."""
+    with inside('WINDOW'):
+        bpy.ops.object.mode_set(mode='EDIT')
+        bpy.ops.mesh.select_mode(type='FACE')
+    mesh = bmesh.from_edit_mesh(base.data)
+    for face in mesh.faces:
+        face.select_set(face.normal.z > 0.5 and face.calc_center_median().xy.length < 0.08)
+    bmesh.update_edit_mesh(base.data)
 
 
 def looked_at(base: bpy.types.Object) -> None:
@@ -79,13 +93,97 @@ def tab() -> Iterator[float]:
     yield 0.5
 
 
-def until(condition: object, seconds: float = 60.0) -> Iterator[float]:
+def until(condition: Callable[[], bool], seconds: float = 60.0) -> Iterator[float]:
     """Wait until `condition()` holds."""
     for _ in range(int(seconds / 0.1)):
         if condition():
             return
         yield 0.1
-    raise AssertionError(f"waited in vain for {condition.__name__}")
+    raise AssertionError(f"waited in vain, as line {condition.__code__.co_firstlineno} asks for")
+
+
+def photo(name: str) -> Iterator[float]:
+    """Ask the test for a picture of the screen, and wait until it has been taken."""
+    yield from tab()
+    wanted = Path(answer).with_name(f"{name}.wanted")
+    wanted.write_text(os.environ["DISPLAY"], encoding="utf-8")
+    yield from until(lambda: not wanted.exists())
+
+
+def edited(name: str) -> None:
+    """End an edit as the sidebar does, which makes it one step of undo."""
+    with inside('WINDOW'):
+        bpy.ops.ed.undo_push(message=name)
+
+
+def the_pattern() -> bpy.types.Object:
+    """The pattern; after an undo it is another object in memory."""
+    return next(obj for obj in bpy.data.objects if obj.bubble_pattern.base is not None)
+
+
+def module(name: str) -> ModuleType:
+    """A module of the extension that is installed here."""
+    return importlib.import_module(f"bl_ext.user_default.bubble_pattern.blender.{name}")
+
+
+def live_changes(pattern: bpy.types.Object) -> Iterator[float]:
+    """A burst of changes, as of a slider that is dragged: the pattern follows when the mouse rests."""
+    settings, generation = pattern.bubble_pattern, module("generation")
+    settings.diameter_mode = 'SHARE'
+    pitch, laid, real = settings.pitch, [], generation.put
+
+    def counted(*arguments: object) -> None:
+        laid.append(arguments)
+        real(*arguments)
+
+    generation.put = counted
+    yield 1.0
+    for step in range(1, 11):
+        settings.pitch = pitch * (1 + 0.02 * step)
+    found["laid in the burst"] = len(laid)
+
+    def followed() -> bool:
+        return not module("settings_recipe").is_outdated(settings)
+
+    yield from until(followed)
+    found["laid after the burst"] = len(laid)
+    found["points after the burst"] = len(pattern.data.vertices) == settings.count
+    generation.put = real
+    settings.pitch = pitch
+    yield from until(followed)
+
+
+def long_update(pattern: bpy.types.Object) -> Iterator[float]:
+    """A long packing: the view is turned meanwhile, keys that edit do nothing, a right click ends it."""
+    settings, stepping, runs = pattern.bubble_pattern, module("stepping"), module("runs")
+    before, pitch = settings.count, settings.pitch
+    settings.live = False
+    settings.pitch = pitch / 4
+    kept = stepping.PATIENCE, stepping.SLICE, stepping.LONGEST_SLICE
+    stepping.PATIENCE = stepping.SLICE = stepping.LONGEST_SLICE = 0.0  # one step at a time
+    found["long update"] = sorted(pressed("update"))
+
+    def settling() -> bool:
+        run = runs.under_way()
+        return run is not None and run.latest.snapshot is not None
+
+    yield from until(settling)
+    yield from photo("3-settling")
+    shown = view().spaces.active.region_3d
+    distance = shown.view_distance
+    place = region('WINDOW')
+    (window,) = bpy.context.window_manager.windows
+    for kind in ('WHEELUPMOUSE', 'X', 'RIGHTMOUSE'):
+        for value in ('PRESS', 'RELEASE'):
+            window.event_simulate(type=kind, value=value, x=place.x + 200, y=place.y + 200)
+        yield 1.0
+        if kind == 'X':
+            found["zoomed while packing"] = shown.view_distance != distance
+            found["still packing"] = runs.under_way() is not None
+    found["after the right click"] = [runs.under_way() is None, settings.count == before, pattern.name]
+    stepping.PATIENCE, stepping.SLICE, stepping.LONGEST_SLICE = kept
+    settings.pitch = pitch
+    settings.live = True
 
 
 def story() -> Iterator[float]:
@@ -94,17 +192,53 @@ def story() -> Iterator[float]:
     looked_at(base)
     bpy.types.BUBBLE_PATTERN_PT_main.append(drawn)
     yield from tab()
+    front_selected(base)
+    edited("Select")
+    yield from photo("1-select")
+    yield from adding()
+    yield from live_changes(the_pattern())
+    yield from long_update(the_pattern())
+    yield from editing()
+    yield from cancelling()
+    yield from applying()
+    yield from exporting()
 
-    pressed("add")
 
-    def pattern_there() -> bool:
-        return base.name + " Pattern" in bpy.data.objects
+def adding() -> Iterator[float]:
+    """Press Add Pattern."""
+    found["add"] = sorted(pressed("add"))
+    yield from until(lambda: any(obj.bubble_pattern.base for obj in bpy.data.objects))
+    with inside('WINDOW'):
+        bpy.ops.object.mode_set(mode='OBJECT')
+    edited("Add Pattern")
+    found["features"] = the_pattern().bubble_pattern.count
+    yield from photo("2-add")
 
-    yield from until(pattern_there)
-    pattern = bpy.data.objects[base.name + " Pattern"]
-    found["features"] = pattern.bubble_pattern.count
-    yield from tab()
 
+def editing() -> Iterator[float]:
+    """A larger pitch, slots instead of circles, and the slots taken back."""
+    settings = the_pattern().bubble_pattern
+    before, pitch = settings.count, settings.pitch
+    settings.pitch = 1.5 * pitch
+    yield from until(lambda: the_pattern().bubble_pattern.count < before)
+    edited("Pitch")
+    wide = the_pattern().bubble_pattern.count
+    yield from photo("4-wider")
+    settings = the_pattern().bubble_pattern
+    settings.profile, settings.turn = 'SLOT', 'BOUNDARY'
+    yield 0.5
+    edited("Slots")
+    yield from photo("5-slots")
+    with inside('WINDOW'):
+        bpy.ops.ed.undo()
+    yield 0.5
+    settings = the_pattern().bubble_pattern
+    found["after undo"] = [settings.profile, settings.count == wide]
+
+
+def cancelling() -> Iterator[float]:
+    """Begin a long Apply and give it up."""
+    base = the_pattern().bubble_pattern.base
     fine = base.modifiers.new("Fine", 'SUBSURF')
     fine.levels = 2
     found["long apply"] = sorted(pressed("apply"))
@@ -115,19 +249,30 @@ def story() -> Iterator[float]:
     found["objects after Esc"] = sorted(obj.name for obj in bpy.data.objects)
     found["base after Esc"] = base.visible_get()
     base.modifiers.remove(fine)
-    yield 0.2
+    yield from photo("6-cancelled")
 
+
+def applying() -> Iterator[float]:
+    """Press Apply."""
+    base = the_pattern().bubble_pattern.base
     pressed("apply")
-
-    def part_there() -> bool:
-        return base.name + " Part" in bpy.data.objects
-
-    yield from until(part_there)
+    yield from until(lambda: base.name + " Part" in bpy.data.objects)
     part = bpy.data.objects[base.name + " Part"]
+    settings = the_pattern().bubble_pattern
     found["euler"] = euler(part.data)
     found["closed"] = is_closed(part.data)
-    found["holes"] = pattern.bubble_pattern.count
-    found["verdict"] = pattern.bubble_pattern.verdict
+    found["holes"] = settings.count
+    found["verdict"] = settings.verdict
+    yield from photo("7-part")
+
+
+def exporting() -> Iterator[float]:
+    """Write the part, the table and a drawing."""
+    for suffix in ("stl", "csv", "dxf"):
+        target = Path(answer).with_name(f"grille.{suffix}")
+        with inside('WINDOW'):
+            bpy.ops.bubble_pattern.export(filepath=str(target), format=suffix.upper())
+        found[suffix] = target.stat().st_size
     yield from tab()
     yield 0.5
 

@@ -350,9 +350,24 @@ def test_two_patterns_make_one_part() -> None:
     part = apply()
     assert is_closed(part.data)
     assert first.bubble_pattern.part == second.bubble_pattern.part == part
-    second.bubble_pattern.depth = 0.0004
-    with pytest.raises(RuntimeError, match="different features"):
-        bpy.ops.bubble_pattern.apply()
+
+
+def test_patterns_with_different_features_make_one_part() -> None:
+    base = plate()
+    first = add_on_top(base)
+    select_faces(base, lambda face: face.normal.z < -0.7)
+    bpy.ops.bubble_pattern.add()
+    second = pattern_of(bpy.context.object)
+    first.bubble_pattern.depth_mode = 'BLIND'
+    first.bubble_pattern.depth = 0.0005
+    second.bubble_pattern.kind = 'BUMP'
+    second.bubble_pattern.height = 0.0006
+    part = apply()
+    assert is_closed(part.data)
+    assert euler(part.data) == 2
+    height = [vertex.co.z for vertex in part.data.vertices]
+    assert (min(height), max(height)) == pytest.approx((-0.0056, 0.005), abs=1e-7)
+    assert first.bubble_pattern.verdict == second.bubble_pattern.verdict == ""
 
 
 def test_applying_again_replaces_the_part() -> None:

@@ -349,3 +349,24 @@ def test_an_empty_clipboard_is_told() -> None:
     recipe_operators._held.clear()
     with pytest.raises(RecipeError, match="copy a recipe first"):
         recipe_operators.from_clipboard(bpy.context)
+
+
+def test_a_target_in_a_recipe_is_solved_for_as_the_button_does() -> None:
+    pattern, twin = a_pattern(), a_pattern(name="Twin")
+    activate(pattern.bubble_pattern.base)
+    recipe_operators._held[:] = ["[solve]\nopen_area = 0.3"]
+    assert OPS.recipe_paste() == {'FINISHED'}
+    assert pattern.bubble_pattern.open_area == pytest.approx(0.3, rel=0.005)
+    activate(twin.bubble_pattern.base)
+    twin.bubble_pattern.solve_for, twin.bubble_pattern.solve_open_area = 'OPEN_AREA', 30.0
+    assert OPS.solve() == {'FINISHED'}
+    assert pattern.bubble_pattern.diameter == pytest.approx(twin.bubble_pattern.diameter, rel=0.005)
+
+
+def test_the_rules_of_a_process_go_along() -> None:
+    pattern = a_pattern()
+    pattern.bubble_pattern.process = 'LASER'
+    pattern.bubble_pattern.density = 2.7
+    tables = tomllib.loads(copied())
+    assert tables["limits"]["process"] == "laser"
+    assert tables["output"] == tables["output"] | {"density": 2.7, "unit": "m"}

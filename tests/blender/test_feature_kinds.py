@@ -10,6 +10,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="needs the bpy module: python scripts/test.py --blender VERSION")
 
+from bubble_pattern_addon import batch  # noqa: E402
 from bubble_pattern_addon.blender.feature_settings import feature_of, take_feature  # noqa: E402
 from bubble_pattern_addon.blender.feature_shapes import KEY  # noqa: E402
 from bubble_pattern_addon.blender.properties import pattern_of  # noqa: E402
@@ -188,6 +189,38 @@ def test_a_curve_and_a_mesh_as_features() -> None:
     part = bpy.context.object
     assert is_closed(part.data)
     assert max(vertex.co.z for vertex in part.data.vertices) == pytest.approx(0.0056, abs=1e-7)
+
+
+def test_a_kind_starts_with_sizes_that_suit_the_diameter() -> None:
+    settings = add_on_top(plate(0.05)).bubble_pattern
+    settings.kind = 'BUMP'
+    assert settings.height == pytest.approx(settings.diameter / 4, rel=0.1)
+    settings.form = 'BOSS'
+    settings.rim = 'FILLET'
+    assert settings.rim_size == pytest.approx(settings.diameter / 10, rel=0.1)
+    settings.height = 0.002
+    settings.kind = 'DIMPLE'
+    settings.kind = 'BUMP'
+    assert settings.height == pytest.approx(0.002)
+
+
+def test_a_batch_run_takes_its_mesh_into_the_blend(tmp_path: Path) -> None:
+    bpy.ops.mesh.primitive_cube_add(size=1.0)
+    bpy.ops.wm.stl_export(filepath=str(tmp_path / "base.stl"))
+    bpy.ops.mesh.primitive_cone_add(vertices=6, depth=1.0, location=(0, 0, 0.5))
+    bpy.ops.wm.stl_export(filepath=str(tmp_path / "cone.stl"), export_selected_objects=True)
+    (tmp_path / "recipe.toml").write_text(
+        "[region]\nnear = [0, 0, 0.5]\n[packing]\npitch = 0.2\n[output]\nblend = true\n"
+        '[feature]\nkind = "bump"\nprofile = "mesh"\nmesh = "cone.stl"\nheight = 0.05\n'
+    )
+    out = tmp_path / "out"
+    files = [str(tmp_path / "recipe.toml"), "--base", str(tmp_path / "base.stl"), "--out", str(out)]
+    assert batch.main([*files, "--quiet"]) == 0
+    bpy.ops.wm.open_mainfile(filepath=str(out / "pattern.blend"))
+    (pattern,) = (obj for obj in bpy.data.objects if obj.bubble_pattern.base is not None)
+    settings = pattern.bubble_pattern
+    assert feature_of(settings) == Feature(kind="bump", profile="mesh", mesh="cone", height=0.05)
+    assert len(shapes()) == 1
 
 
 def test_an_open_curve_is_told() -> None:

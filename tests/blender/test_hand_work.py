@@ -199,6 +199,9 @@ def test_hand_work_is_not_thrown_away_unasked() -> None:
     settings.pitch = 0.006
     assert np.array_equal(points(pattern), before)
     assert settings_recipe.is_outdated(settings)
+    activate(pattern)
+    with pytest.raises(RuntimeError, match="packing has changed since the features were settled by hand"):
+        bpy.ops.bubble_pattern.apply()
     settings.pitch = PITCH
     assert not settings_recipe.is_outdated(settings)
     assert np.array_equal(points(pattern), before)

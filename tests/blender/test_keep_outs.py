@@ -10,7 +10,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from bubble_pattern_addon.blender import settings_recipe, sources  # noqa: E402
+from bubble_pattern_addon.blender import live, settings_recipe, sources  # noqa: E402
 from bubble_pattern_addon.blender.properties import pattern_of  # noqa: E402
 from bubble_pattern_addon.core.recipe import KeepOut, RegionChoice  # noqa: E402
 from tests.blender import parts  # noqa: E402
@@ -70,6 +70,20 @@ def test_selected_object_is_kept_out_below_and_when_it_moves() -> None:
     assert bpy.ops.bubble_pattern.update() == {'FINISHED'}
     assert away_from(pattern, -0.02, 0.01).min() == pytest.approx(0.01, abs=2e-5)
     assert away_from(pattern, 0.02, 0.01).min() < 0.003
+
+
+def test_pattern_says_that_a_keep_out_has_moved() -> None:
+    pattern = laid()
+    obj = boss((0.02, 0.01, 0.0))
+    add(pattern, 'OBJECT', object=obj)
+    live.look()
+    assert not live.trouble_of(pattern)
+    obj.location.x = 0.0
+    bpy.context.view_layer.update()
+    live.look()
+    assert "or a keep-out" in live.trouble_of(pattern)
+    assert bpy.ops.bubble_pattern.update() == {'FINISHED'}
+    assert not live.trouble_of(pattern)
 
 
 def test_base_and_object_moved_together() -> None:

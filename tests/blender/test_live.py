@@ -560,6 +560,26 @@ def test_cut_preview_shows_the_holes_and_goes_with_a_change(pattern: bpy.types.O
     assert looked(pattern) == ""
 
 
+def test_cut_preview_goes_with_any_setting(pattern: bpy.types.Object) -> None:
+    settings = pattern.bubble_pattern
+    settings.live = False
+    for name, value in (("depth_mode", 'BLIND'), ("depth", 0.003), ("diameter", 0.004), ("kind", 'BUMP')):
+        settings.cut_preview = True
+        assert settings.cut_preview, settings.cut_trouble
+        setattr(settings, name, value)
+        assert not settings.cut_preview
+        assert not settings.base.modifiers
+        bpy.ops.bubble_pattern.update()
+
+
+def test_cut_preview_of_bumps_adds(pattern: bpy.types.Object) -> None:
+    settings = pattern.bubble_pattern
+    settings.kind = 'BUMP'
+    settings.cut_preview = True
+    top = settings.base.evaluated_get(bpy.context.evaluated_depsgraph_get()).bound_box
+    assert max(corner[2] for corner in top) > 0.0051
+
+
 @pytest.mark.parametrize("button", ["update", "apply", "remove"])
 def test_cut_preview_is_never_part_of_the_base(pattern: bpy.types.Object, button: str) -> None:
     settings, count = pattern.bubble_pattern, pattern.bubble_pattern.count

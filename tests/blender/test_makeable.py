@@ -9,7 +9,7 @@ pytest.importorskip("bpy")
 import bpy
 import numpy as np
 
-from bubble_pattern_addon.blender import noting, overlay
+from bubble_pattern_addon.blender import noting, overlay, result_panel
 from bubble_pattern_addon.blender.properties import pattern_of
 from bubble_pattern_addon.blender.result_panel import (
     broken_text,
@@ -76,8 +76,19 @@ def test_apply_tells_exactly_what_is_removed(pattern: bpy.types.Object) -> None:
     assert settings.part_removed == pytest.approx(volume(base) - volume(settings.part), rel=1e-3)
     assert not figures(pattern)["Removed"].startswith("≈")
     assert bpy.ops.bubble_pattern.edit() == {'FINISHED'}
+    settings.density = 2.7
+    assert not figures(pattern)["Removed"].startswith("≈")
     settings.diameter = 1.9 * MM
-    assert settings.part_removed == -1.0
+    assert figures(pattern)["Removed"].startswith("≈")
+
+
+def test_bumps_add(pattern: bpy.types.Object) -> None:
+    settings = pattern.bubble_pattern
+    settings.kind = 'BUMP'
+    assert not any(name.startswith("Removed") for name in figures(pattern))
+    assert bpy.ops.bubble_pattern.apply() == {'FINISHED'}
+    assert settings.part_removed < 0
+    assert figures(pattern)["Added"] == result_panel.volume_text(bpy.context, -settings.part_removed)
 
 
 # -- process and sizes -----------------------------------------------------------------------------------
@@ -188,7 +199,8 @@ def test_settings_and_recipe_are_the_same_thing(pattern: bpy.types.Object, syste
             "packing": {"pitch": 0.004},
             "shaping": {"diameter": 0.002, "sizes": [0.0015, 0.002]},
             "limits": {"process": "laser", "thickness": 0.0012, "check_only": True},
-            "output": {"density": 2.7, "unit": "m"},
+            # without units, one is taken for a millimetre
+            "output": {"density": 2.7, "unit": "mm" if system == 'NONE' else "m"},
         }
     )
     take_recipe(settings, recipe)

@@ -274,6 +274,30 @@ def test_the_program_makes_a_part(tmp_path: Path) -> None:
     assert (tmp_path / "out" / "part.stl").exists()
 
 
+def test_a_recipe_of_bumps_says_what_it_made(run) -> None:
+    feature = (
+        '[feature]\nkind = "bump"\nprofile = "slot"\nturn = "boundary"\nheight = 0.5\npull = [0, 0, 1]\n'
+    )
+    code, out, err, folder = run(GRILLE + feature, plate())
+    assert (code, err) == (0, "")
+    assert "bumps" in out
+    report = json.loads((folder / "report.json").read_text())
+    assert report["kind"] == "bump"
+    assert report["through"] == report["undercut"] == 0
+    assert report["removed_volume"] < 0
+    with (folder / "features.csv").open() as file:
+        assert next(csv.reader(file))[-6:] == ["ax", "ay", "az", "hx", "hy", "hz"]
+
+
+def test_a_mesh_as_a_feature_is_seen_from_the_recipe_and_goes_along(run, tmp_path: Path) -> None:
+    feature = '[feature]\nkind = "bump"\nprofile = "mesh"\nmesh = "cone.stl"\n'
+    check_refusal(run(GRILLE + feature, plate()), "cone.stl")
+    trimesh.creation.cone(1.0, 1.5, sections=6).export(tmp_path / "cone.stl")
+    code, _out, err, folder = run(GRILLE + feature, plate())
+    assert (code, err) == (0, "")
+    assert (folder / load_recipe(folder / "recipe.toml").feature.mesh).is_file()
+
+
 @pytest.fixture
 def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture):
     """The program's `main` in this process, in a folder with a recipe: (exit code, output, error)."""

@@ -16,12 +16,13 @@ from bubble_pattern_addon.core.drawing_files import drawing_report, write_drawin
 from bubble_pattern_addon.core.drawn_shapes import drawn_shapes
 from bubble_pattern_addon.core.errors import RegionError
 from bubble_pattern_addon.core.feature_recipe import Feature
+from bubble_pattern_addon.core.keep_out import region_with_keep_outs
 from bubble_pattern_addon.core.mesh import Floats, Mesh
 from bubble_pattern_addon.core.metric import Constant
 from bubble_pattern_addon.core.pattern import Pattern
 from bubble_pattern_addon.core.pipeline import pattern_steps
 from bubble_pattern_addon.core.progress import drive
-from bubble_pattern_addon.core.recipe import Packing, Recipe, Shaping
+from bubble_pattern_addon.core.recipe import KeepOut, Packing, Recipe, Shaping
 from bubble_pattern_addon.core.region import Region, make_region
 
 from .bases import as_mesh, slab
@@ -357,7 +358,8 @@ def test_the_same_drawing_gives_the_same_bytes(tmp_path: Path, dome: tuple[Regio
 def test_the_places_of_features_do_not_depend_on_where_the_part_is(dome: tuple[Region, Pattern]) -> None:
     region, pattern = dome
     shift = np.array([100.0, -50.0, 7.0])
-    there = replace(region, base=Mesh(region.base.vertices + shift, region.base.triangles))
+    meshes = (Mesh(mesh.vertices + shift, mesh.triangles) for mesh in (region.base, region.mesh))
+    there = replace(region, **dict(zip(("base", "mesh"), meshes, strict=True)))
     places = replace(pattern.places, position=pattern.position + shift)
     one, two = make_drawing(region, pattern), make_drawing(there, replace(pattern, places=places))
     assert one.centre == pytest.approx(two.centre, abs=1e-6)
@@ -406,3 +408,16 @@ def test_an_axis_other_than_the_normal_decides_how_a_circle_is_seen(dome: tuple[
     pattern = drive(pattern_steps(region, recipe))
     drawing = make_drawing(region, pattern, (0.0, 0.0, 1.0), shapes=drawn_shapes(pattern, feature))
     assert drawing.ratio == pytest.approx(1)
+
+
+def test_what_is_kept_out_is_a_hole_in_the_drawing() -> None:
+    mesh = slab()
+    top = np.arange(len(mesh.triangles)) < 288
+    keep_out = KeepOut(cylinder=(3.0, 2.0, 4.0), diameter=6.0)
+    region = region_with_keep_outs(mesh, top, None, 0.0, (keep_out,), {}, {})
+    pattern = packed(region, 2.0, 1.2)
+    drawing = make_drawing(region, pattern)
+    assert len(drawing.boundary) == 2
+    assert not drawing.cuts
+    assert (clearance(drawing) > drawing.diameter / 2).all()
+    assert drawing.stretch < 1.06

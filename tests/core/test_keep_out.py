@@ -79,7 +79,7 @@ def test_round_boss_is_packed_like_a_round_island() -> None:
     assert np.abs(beside(pattern, away) - 0.5).max() < 0.005
 
 
-@settings(max_examples=8, deadline=None, derandomize=True)
+@settings(max_examples=5, deadline=None, derandomize=True)
 @given(
     x=st.floats(-25, 25),
     y=st.floats(-8, 8),
@@ -104,8 +104,8 @@ def test_limits_count_keep_outs_as_boundary() -> None:
 
 @pytest.mark.parametrize("way", ["object", "file", "collection"])
 def test_body_is_avoided_in_its_shadow(way: str) -> None:
-    ring = body(trimesh.creation.annulus(6, 12, 4, sections=256), -10.0, 3.0, 40.0)
-    peg = body(trimesh.creation.cylinder(4, 5, sections=256), 30.0, -10.0, -9.0)
+    ring = body(trimesh.creation.annulus(6, 12, 4, sections=160), -10.0, 3.0, 40.0)
+    peg = body(trimesh.creation.cylinder(4, 5, sections=160), 30.0, -10.0, -9.0)
     solids: Any = {(way, "bosses"): [Solid(ring, Z), Solid(peg, Z)]}
     entry = KeepOut(**{way: "bosses"}, margin=1.0)  # type: ignore[arg-type]
     region = region_less(PLATE, entry, solids=solids)

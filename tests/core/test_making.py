@@ -114,7 +114,7 @@ def test_a_rib_asks_for_more_than_the_sheet_beside_it() -> None:
 
 
 @pytest.mark.parametrize("process", PROCESSES)
-@settings(max_examples=6, deadline=None, derandomize=True)
+@settings(max_examples=3, deadline=None, derandomize=True)
 @given(thickness=st.floats(0.3, 2.0), unit=st.sampled_from(["mm", "cm", 2.0]))
 def test_a_process_sets_the_limits(process: str, thickness: float, unit: str | float) -> None:
     """Hole, web and margin of every feature are at least what the process asks for; nothing is broken."""
@@ -143,7 +143,7 @@ def test_limits_that_ask_for_more_than_the_process_count(process: str) -> None:
     )
 
 
-@settings(max_examples=20, deadline=None, derandomize=True)
+@settings(max_examples=10, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 10_000), most=st.floats(0.5, 4.0))
 def test_floors_hold_at_every_feature_of_its_own(seed: int, most: float) -> None:
     """As on a wall of varying thickness: of two neighbours the one that asks for more decides."""
@@ -276,7 +276,7 @@ def test_a_process_that_leaves_nothing_is_told_with_its_lengths() -> None:
 # -- nominal sizes -------------------------------------------------------------------------------------------
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=12, deadline=None, derandomize=True)
 @given(
     sizes=st.lists(st.floats(0.5, 5.0), min_size=1, max_size=6),
     limits=st.builds(
@@ -360,7 +360,7 @@ def test_known_drills_are_there() -> None:
 # -- figures -------------------------------------------------------------------------------------------------
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=20, deadline=None, derandomize=True)
 @given(
     data=st.lists(
         st.tuples(st.integers(-8, 8), st.integers(-8, 8), st.floats(0.3, 4.0)),

@@ -31,13 +31,15 @@ PURE = {
         *("draft", "rim_angle", "aspect", "rounding", "points", "axis", "pull", "turn_direction", "angle"),
     },
     "limits": set(),
-    "output": {"projection", "unit"},
+    "solve": {"open_area"},
+    "output": {"projection", "unit", "density"},
 }
 NUMBERS = ("float", "Point", "Described", "Size", "Seed", "KeepOut")
 
 GRADED = """
 [region]
 all = true
+keep_out = [{ cylinder = [40, 0, 0], diameter = 6, axis = [0, 0, 1], reach = 2, margin = 0.5 }]
 [packing]
 pitch = { kind = "linear", from = 1.6, to = 2.4, start = [-12, 0, 0], end = [12, 0, 0] }
 edge_offset = 0.1
@@ -93,6 +95,10 @@ def test_a_scaled_recipe_makes_the_same_pattern_on_a_scaled_base(factor: float) 
     )
     assert scaled.feature.depth == pytest.approx(0.5 * factor)
     assert scaled.packing.symmetry_centre == pytest.approx(np.array([1, 2, 3]) * factor)
+    (around,) = scaled.region.keep_out
+    assert around.cylinder == pytest.approx((40 * factor, 0, 0))
+    assert (around.diameter, around.reach, around.margin) == pytest.approx(np.array([6, 2, 0.5]) * factor)
+    assert around.axis == (0, 0, 1)
 
 
 def test_there_and_back_again_is_the_same_recipe() -> None:
@@ -150,3 +156,12 @@ def test_what_is_drawn_is_in_the_recipe_file() -> None:
     assert recipe.output.projection == (0, -1, 0)
     assert recipe.output.unit == 2.5
     assert recipe_from_dict(tomllib.loads(recipe_to_toml(recipe))) == recipe
+
+
+def test_sizes_and_thickness_are_lengths_and_a_series_is_none() -> None:
+    text = "[region]\nall = true\n[shaping]\nsizes = {}\n[limits]\nprocess = \"cnc\"\nthickness = 2.0\n"
+    listed = scaled_recipe(recipe_from_dict(tomllib.loads(text.format("[1.0, 2.5]"))), 0.001)
+    assert listed.shaping.sizes == (0.001, 0.0025)
+    assert listed.limits.thickness == 0.002
+    named = scaled_recipe(recipe_from_dict(tomllib.loads(text.format('"R10"'))), 0.001)
+    assert named.shaping.sizes == "R10"
