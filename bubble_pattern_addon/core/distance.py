@@ -78,22 +78,6 @@ def boundary_distance(points: Floats, segments: Floats, within: float = np.inf) 
     return distance_to(index_segments(segments), points, within)
 
 
-def nearest_directions(segments: Floats, points: Floats) -> Floats:
-    """Unit directions (n, 3) of the segments (S, 2, 3), at least one, nearest to each of `points` (n, 3)."""
-    index = index_segments(segments)
-    nearest = distance_to(index, points)
-    piece = np.zeros(len(points), dtype=np.int64)
-    left, k = np.arange(len(points)), min(4, len(index.pieces))
-    while len(left):
-        found = index.tree.query(points[left], np.arange(1, k + 1))[1]
-        reach = _point_segment(points[left, None], index.pieces[found])
-        piece[left] = found[np.arange(len(left)), reach.argmin(axis=1)]
-        far = reach.min(axis=1) > nearest[left] * (1 + 1e-9)
-        left, k = left[far & (k < len(index.pieces))], min(2 * k, len(index.pieces))
-    along = index.pieces[piece, 1] - index.pieces[piece, 0]
-    return along / np.linalg.norm(along, axis=1, keepdims=True)
-
-
 def _short_pieces(segments: Floats) -> Floats:
     """The same line in pieces of about even length, (P, 2, 3), at most about twice as many as segments."""
     a, b = segments[:, 0], segments[:, 1]

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .distance import nearest_directions
+from .distance import index_segments, nearest_piece
 from .errors import FieldError, RecipeError
 from .feature_checks import STEEPEST_DRAFT
 from .feature_recipe import ASPECTS, Feature
@@ -16,12 +16,15 @@ from .metric import Described, Field
 from .painted import painted
 from .pattern import Pattern
 from .profile import outlines, signed_area
+from .region import Region
 from .surroundings import Surroundings
 
 # A direction this much shorter than it was, once laid square to the axis, points nowhere.
 NOWHERE = 1e-6
 # The surface bends as much one way as the other where the normals of neighbours differ by less, in radians.
 EVEN_BEND = 2e-3
+# Steps of the boundary on a stretch of so many pitches to either side are smoothed over.
+BESIDE = 0.75
 # what a size must be above, and at most
 RANGES = {
     "depth": (0.0, np.inf),
@@ -146,7 +149,7 @@ def _directions(
             raise FieldError(
                 '[feature] turn = "boundary": the target region is closed, without a boundary: use another'
             )
-        return nearest_directions(region.boundary_segments, position)
+        return along_boundary(region, position, bubbles.pitch)
     if turn == "attribute":
         assert feature.turn_attribute is not None  # check has seen to it
         try:
@@ -161,6 +164,37 @@ def _directions(
         return turned(axis, row, 2 * np.pi * angles[bubbles.ids])
     towards = np.array(feature.turn_point, dtype=np.float64) - position
     return towards if turn == "towards" else np.cross(axis, towards)
+
+
+def along_boundary(region: Region, position: Floats, pitch: Floats) -> Floats:
+    """Directions (n, 3) of the boundary where it is nearest to each place (n, 3), the region on its left.
+
+    Of the stretch of BESIDE pitches to either side it is the chord, so that a boundary of small steps, as of
+    faces chosen on a grid, leads them as the line that it stands for.
+    """
+    segments, sizes = region.boundary_segments, [len(loop) for loop in region.loops]
+    along = segments[:, 1] - segments[:, 0]
+    length = np.linalg.norm(along, axis=1)
+    end = np.cumsum(length)
+    index = index_segments(segments)
+    piece_end = np.cumsum(np.linalg.norm(index.pieces[:, 1] - index.pieces[:, 0], axis=1))
+    piece = nearest_piece(index, position)[1]
+    middle = (piece_end[piece] + np.concatenate([[0.0], piece_end])[piece]) / 2
+    loop_end = end[np.cumsum(sizes) - 1]
+    loop_begin = np.concatenate([[0.0], loop_end[:-1]])
+    loop = np.minimum(np.searchsorted(loop_end, middle), len(loop_end) - 1)
+    around = loop_end[loop] - loop_begin[loop]
+    reach = np.minimum(BESIDE * pitch, around / 4)
+
+    def place(way: Floats) -> Floats:
+        """Points (n, 3) so far along the loops."""
+        arc = loop_begin[loop] + np.mod(way - loop_begin[loop], around)
+        on = np.minimum(np.searchsorted(end, arc), len(end) - 1)
+        share = (arc - (end[on] - length[on])) / np.maximum(length[on], 1e-300)
+        return segments[on, 0] + np.clip(share, 0, 1)[:, None] * along[on]
+
+    chord = place(middle + reach) - place(middle - reach)
+    return chord / np.linalg.norm(chord, axis=1, keepdims=True)
 
 
 def least_bent(bubbles: Pattern, row: Floats, links: Links) -> Floats:
