@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from .boundary import Boundary, nearest_boundary
 from .isometries import AUTO, OFF, Isometries, image_of, isometries, words_of
 from .mesh import Floats, Ints
+from .region import Region
 from .surface import Charts, Spots, positions, to_frame, walk
 
 Lengths = Callable[[Spots], Floats]
@@ -140,8 +141,9 @@ def find_symmetry(
     finder = make_finder(charts, local)
     middle = _middle(charts, TOLERANCE * local) if centre is None else np.array(centre, dtype=np.float64)
     best: tuple[float, Isometries] | None = None
-    for spelled in words_of(word):
-        group = isometries(spelled, middle, np.array(axes) if len(axes) else None)
+    given = np.array(axes) if len(axes) else None
+    groups = [isometries(spelled, middle, given) for spelled in words_of(word)]
+    for group in _likely(region, groups, TOLERANCE * local):
         off = max(_off(finder, boundary, group, int(number), FEW) for number in group.generators)
         if off < TOLERANCE * local:
             off = max(_off(finder, boundary, group, int(number)) for number in group.generators)
@@ -154,8 +156,33 @@ def find_symmetry(
         if best is None or off < best[0]:
             best = off, group
     assert best is not None
-    off = max(_off(finder, boundary, best[1], int(number)) for number in best[1].generators)
+    # Where nobody has asked for this one, a few places show well enough how far off it is.
+    most = FEW if word == AUTO else SAMPLES
+    off = max(_off(finder, boundary, best[1], int(number), most) for number in best[1].generators)
     return Finding(None, (_none(word, best[1], off, local),))
+
+
+def _likely(region: Region, groups: list[Isometries], near: float) -> list[Isometries]:
+    """Those of the groups under which the region's second moments of area stay what they are, as far as they
+    must where no image of a place is farther off than `near`; the nearest one where none is likely.
+
+    It takes no time and spares a search over the surface for most symmetries that are out of the question.
+    """
+    corners, area = region.corners, np.linalg.norm(region.area_vectors, axis=1) / 2
+    changed, most = np.empty(len(groups)), np.empty(len(groups))
+    for number, group in enumerate(groups):
+        offset = corners - group.centre
+        whole = offset.sum(axis=1)
+        # A triangle's second moments: area / 12 times those of its corners and of their sum.
+        moments = np.einsum("r,rka,rkb->ab", area / 12, offset, offset)
+        moments += np.einsum("r,ra,rb->ab", area / 12, whole, whole)
+        reach = float(np.linalg.norm(offset, axis=2).max())
+        most[number] = 2 * near * (region.perimeter * reach**2 + 2 * region.area * reach)
+        turned = group.turns @ moments @ group.turns.swapaxes(1, 2)
+        changed[number] = np.abs(turned - moments).max()
+    if (changed <= most).any():
+        return [group for group, is_likely in zip(groups, changed <= most, strict=True) if is_likely]
+    return [groups[int((changed / most).argmin())]]
 
 
 def _middle(charts: Charts, near: float) -> Floats:
