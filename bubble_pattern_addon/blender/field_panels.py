@@ -44,6 +44,8 @@ def draw_field(
     row = column.row(align=True)
     row.prop(field, "falloff")
     row.prop(field, "invert", text="", icon='ARROW_LEFTRIGHT', toggle=True)
+    if field.falloff == 'CURVE':
+        column.column(align=True).prop(field, "heights", slider=True)
     if field.falloff == 'LINEAR' and field.kind in {'LINEAR', 'ATTRIBUTE'}:
         column.prop(field, "clamp")
 

@@ -17,6 +17,8 @@ from bpy.props import (
 
 from ..core.toml_values import Point
 
+# Where on the way the curve of one's own has its heights.
+QUARTERS = (0.0, 0.25, 0.5, 0.75, 1.0)
 # What a kind starts with, relative to what the constant was: the second value, and how far it is to it.
 SECOND, WAY = {"pitch_field": 2.0, "diameter_field": 0.5, "depth_field": 2.0, "aspect_field": 0.5}, 5.0
 
@@ -149,10 +151,16 @@ class BubblePatternField(bpy.types.PropertyGroup):
             ('SPHERE', "Sphere", "Fast at the start, and round to the end", 'SPHERECURVE', 2),
             ('ROOT', "Root", "Fast at the start", 'ROOTCURVE', 3),
             ('SHARP', "Sharp", "Slowly at the start", 'SHARPCURVE', 4),
+            ('CURVE', "Curve", "Smoothly through five heights of your own", 'FCURVE', 5),
         ),
         default='LINEAR',
         update=changed,
     )
+    heights: FloatVectorProperty(
+        name="Curve",
+        description="How far the value has gone at the start, at every quarter of the way and at the end",
+        size=len(QUARTERS), min=0.0, max=1.0, default=QUARTERS, precision=2, update=changed,
+    )  # fmt: skip
     invert: BoolProperty(name="Invert", description="Swap start and end", default=False, update=changed)
     clamp: BoolProperty(
         name="Clamp",

@@ -17,7 +17,7 @@ from ..core.fields import Distance, Edge, Linear, Radial
 from ..core.metric import Constant, Described
 from ..core.painted import Attribute, Image
 from ..core.toml_values import Point
-from .field_properties import BubblePatternField, beside, point_of, typed, uv_names
+from .field_properties import QUARTERS, BubblePatternField, beside, point_of, typed, uv_names
 from .reading import transformed, world_frame
 
 # Blender keeps 32 bits of a number: this is how far it may be from the one in a recipe, relative to it.
@@ -41,6 +41,7 @@ def described(field: Any, constant: float, share: bool, where: str) -> Described
         "from_": typed(ends[0]),
         "to": typed(ends[1]),
         "falloff": field.falloff.lower(),
+        "curve": curve_of(field) if field.falloff == 'CURVE' else (),
         "invert": field.invert,
         "clamp": field.clamp or field.falloff != 'LINEAR',
     }
@@ -56,6 +57,11 @@ def from_text(text: str, where: str) -> Described:
             f'{where}: "{text[:40]}" is no field: write {{ kind = "linear", ... }} ({error})'
         ) from None
     return field_from_toml(table["field"], where)
+
+
+def curve_of(field: Any) -> tuple[tuple[float, float], ...]:
+    """The control points of the curve that a falloff goes through."""
+    return tuple((t, typed(height)) for t, height in zip(QUARTERS, field.heights, strict=True))
 
 
 def chosen(value: Any, where: str, what: str) -> Any:
@@ -193,6 +199,9 @@ def _property(name: str, value: Any) -> Iterator[tuple[str, Any]]:
     if name == "objects":
         yield "object", bpy.data.objects.get(value[0]) if len(value) == 1 else None
         yield "objects", None
+    elif name == "curve":
+        if tuple(t for t, _ in value) == QUARTERS:
+            yield "heights", tuple(height for _, height in value)
     elif name == "object":
         yield name, bpy.data.objects.get(value or "")
     elif name == "image":

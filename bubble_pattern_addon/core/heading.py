@@ -23,7 +23,10 @@ from .surroundings import Surroundings
 NOWHERE = 1e-6
 # The surface bends as much one way as the other where the normals of neighbours differ by less, in radians.
 EVEN_BEND = 2e-3
-# Steps of the boundary on a stretch of so many pitches to either side are smoothed over.
+# Steps of the boundary, between turns sharper than this and no longer than so many pitches, are smoothed over
+# on a stretch of so many pitches to either side.
+SHARP_TURN = np.radians(30.0)
+STEP = 2.0
 BESIDE = 0.75
 # what a size must be above, and at most
 RANGES = {
@@ -169,32 +172,58 @@ def _directions(
 def along_boundary(region: Region, position: Floats, pitch: Floats) -> Floats:
     """Directions (n, 3) of the boundary where it is nearest to each place (n, 3), the region on its left.
 
-    Of the stretch of BESIDE pitches to either side it is the chord, so that a boundary of small steps, as of
-    faces chosen on a grid, leads them as the line that it stands for.
+    Where it goes on for less than STEP pitches between two sharp turns, as round faces chosen on a grid, it
+    is the chord of BESIDE pitches to either side: the way of the line that the steps stand for.
     """
     segments, sizes = region.boundary_segments, [len(loop) for loop in region.loops]
     along = segments[:, 1] - segments[:, 0]
-    length = np.linalg.norm(along, axis=1)
+    length = np.maximum(np.linalg.norm(along, axis=1), 1e-300)
     end = np.cumsum(length)
     index = index_segments(segments)
-    piece_end = np.cumsum(np.linalg.norm(index.pieces[:, 1] - index.pieces[:, 0], axis=1))
+    piece_along = index.pieces[:, 1] - index.pieces[:, 0]
+    piece_end = np.cumsum(np.linalg.norm(piece_along, axis=1))
     piece = nearest_piece(index, position)[1]
     middle = (piece_end[piece] + np.concatenate([[0.0], piece_end])[piece]) / 2
     loop_end = end[np.cumsum(sizes) - 1]
     loop_begin = np.concatenate([[0.0], loop_end[:-1]])
     loop = np.minimum(np.searchsorted(loop_end, middle), len(loop_end) - 1)
-    around = loop_end[loop] - loop_begin[loop]
+    begin, around = loop_begin[loop], (loop_end - loop_begin)[loop]
     reach = np.minimum(BESIDE * pitch, around / 4)
 
     def place(way: Floats) -> Floats:
         """Points (n, 3) so far along the loops."""
-        arc = loop_begin[loop] + np.mod(way - loop_begin[loop], around)
+        arc = begin + np.mod(way - begin, around)
         on = np.minimum(np.searchsorted(end, arc), len(end) - 1)
-        share = (arc - (end[on] - length[on])) / np.maximum(length[on], 1e-300)
-        return segments[on, 0] + np.clip(share, 0, 1)[:, None] * along[on]
+        share = np.clip((arc - (end[on] - length[on])) / length[on], 0, 1)
+        return segments[on, 0] + share[:, None] * along[on]
 
+    going = _between_turns(along / length[:, None], end - length, sizes, middle, begin, around)
+    steps = going < STEP * pitch
     chord = place(middle + reach) - place(middle - reach)
-    return chord / np.linalg.norm(chord, axis=1, keepdims=True)
+    way = np.where(steps[:, None], chord, piece_along[piece])
+    return way / np.linalg.norm(way, axis=1, keepdims=True)
+
+
+def _between_turns(
+    unit: Floats, start: Floats, sizes: list[int], at: Floats, begin: Floats, around: Floats
+) -> Floats:
+    """How far the loops go on between the sharp turns on both sides of the arcs `at`, (n,).
+
+    unit, start: (S, 3) directions and (S,) arcs of the segments, sizes: of the loops; begin, around: (n,) of
+    the loop that each arc is on
+    """
+    ends = np.cumsum(sizes)
+    before = np.arange(len(unit)) - 1
+    before[ends - sizes] = ends - 1
+    turn = start[np.einsum("sc,sc->s", unit[before], unit) < np.cos(SHARP_TURN)]
+    if not len(turn):
+        return around
+    first, beyond = np.searchsorted(turn, begin), np.searchsorted(turn, begin + around)
+    after = np.searchsorted(turn, at)
+    wrapped = np.minimum(first, len(turn) - 1), np.minimum(beyond, len(turn)) - 1
+    following = np.where(after < beyond, turn[np.minimum(after, len(turn) - 1)], turn[wrapped[0]] + around)
+    preceding = np.where(after > first, turn[after - 1], turn[wrapped[1]] - around)
+    return np.where(beyond > first, following - preceding, around)
 
 
 def least_bent(bubbles: Pattern, row: Floats, links: Links) -> Floats:

@@ -719,6 +719,27 @@ def test_the_sidebar_shows_what_a_kind_needs() -> None:
     assert drawn == [f"bubble_pattern.{name}" for name in names]
 
 
+def test_a_curve_of_one_s_own_goes_through_its_five_heights() -> None:
+    pattern = add_on_top(plate())
+    settings = pattern.bubble_pattern
+    field = settings.diameter_field
+    field.kind = 'LINEAR'
+    field.falloff, field.heights = 'CURVE', (0.0, 0.9, 1.0, 0.2, 0.0)
+    graded = settings_recipe.recipe_of(settings).shaping.diameter
+    assert graded.falloff == "curve"
+    assert graded.curve == ((0.0, 0.0), (0.25, 0.9), (0.5, 1.0), (0.75, 0.2), (1.0, 0.0))
+    least, most = sorted((field.start_size, field.end_size))
+    sizes = points(pattern, "diameter")
+    assert least < most
+    assert sizes.max() - sizes.min() > 0.9 * (most - least)  # there and back again
+    settings_recipe.take_recipe(settings, settings_recipe.recipe_of(settings))
+    assert (field.kind, field.falloff) == ('LINEAR', 'CURVE')
+    assert tuple(field.heights) == pytest.approx((0.0, 0.9, 1.0, 0.2, 0.0))
+    drawn: list[str] = []
+    field_panels.draw_field(Layout(drawn), settings, "diameter", "diameter_field", False, "Diameter")
+    assert "heights" in drawn
+
+
 def test_names_and_tooltips_of_fields_are_as_blender_has_them() -> None:
     from bubble_pattern_addon.blender.fixed_sizes import CLASSES
 
