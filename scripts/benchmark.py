@@ -45,6 +45,8 @@ from scripts.shapes import SHAPES, Shape, circle, curved_slab, plate, rectangle_
 
 ENOUGH = 12.0
 """Seconds of one measurement after which it is not repeated any more."""
+STEADY = 2.0
+"""Seconds that measurements in turn go on for in all, at least."""
 HOLE = Feature(kind="hole", sides=32)
 
 
@@ -88,12 +90,17 @@ def _number(value: float, digits: int) -> str:
 
 
 def in_turn(runs: list[Callable[[], float]], repeats: int) -> list[float]:
-    """Median of the seconds that each run returns; they take turns, `repeats` times or for ENOUGH seconds."""
+    """Median of the seconds that each run returns; they take turns, `repeats` times or for ENOUGH seconds,
+    but quick ones so often that chance has no say: for STEADY seconds in all.
+    """
     seconds: list[list[float]] = [[] for _ in runs]
-    for _ in range(repeats):
+    while len(seconds[0]) < repeats or sum(map(sum, seconds)) < STEADY:
+        before = sum(map(len, seconds))
         for run, taken in zip(runs, seconds, strict=True):
             if sum(taken) < ENOUGH:
                 taken.append(run())
+        if sum(map(len, seconds)) == before:
+            break
     return [statistics.median(taken) for taken in seconds]
 
 
