@@ -13,6 +13,7 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.integrate import trapezoid
 
 from bubble_pattern_addon.core.closed import measure
 from bubble_pattern_addon.core.errors import RecipeError
@@ -94,7 +95,7 @@ def volume_of(feature: Feature, diameter: float, deep: float) -> float:
         return whole * float(feature.height) / 3
     length = deep if feature.kind == "hole" else float(feature.height)
     z = np.linspace(0, length, 41)  # from the rim on
-    return float(np.trapezoid(area_at(feature, diameter, inset_at(feature, z, length)), z))
+    return float(trapezoid(area_at(feature, diameter, inset_at(feature, z, length)), z))
 
 
 def inset_at(feature: Feature, z: Floats, length: float) -> Floats:
