@@ -56,8 +56,11 @@ TURNS = (0.0, 15.0, 30.0, 45.0)
 # defects that a closed surface must have: an even icosahedral lattice on a sphere of 1,000 has psi6 .92 to
 # .95 itself, by how far its gaps are evened out.
 CRAMPED = 1.04
-# Rounds of relaxation and population control, and how many steps each may take; the last phases' steps.
+# Rounds of relaxation and population control: another is due when more than this share came or went, else the
+# last phase evens it out.
 ROUNDS, ROUNDS_GRADED = 3, 2
+FEW_CHANGED = 0.01
+# Steps of the last phase, and how often it may be done again.
 STIFF_STEPS, LAST_ROUNDS = 45, 4
 NOT_SYMMETRIC = "The pattern is not symmetric: some of its features are placed by hand."
 
@@ -159,7 +162,7 @@ def _settled(
         settling = settle(ground, bubbles, filling(ground, bubbles, local), steps, packing.tolerance)
         bubbles, _ = yield from within(settling, 0.2 + 0.2 * number, 0.4 + 0.2 * number)
         bubbles, changed = control(ground, bubbles, local)
-        if not changed:
+        if changed <= FEW_CHANGED * len(bubbles):
             break
     yield Progress("Evening out the gaps", 0.8)
     for number in range(LAST_ROUNDS):
