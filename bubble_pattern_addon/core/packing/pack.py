@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from .direction import smooth_directions
 from .force import STIFFNESS, stiff_law
 from .lattice import growing_steps
 from .narrows import in_the_narrows
-from .orbits import orbit_sizes, settled_leaders, symmetric_start, with_followers
+from .orbits import led_here, orbit_sizes, settled_leaders, symmetric_start, with_followers
 from .pins import PUSHED, check_apart, clear_of, on_surface, track_through, with_pins
 from .plane import fills_its_box, lay
 from .population import control
@@ -266,11 +267,13 @@ def _without_conflicts(ground: Ground, row: FirstRow) -> FirstRow:
 def _lattice(ground: Ground, seeds: Spots, directions: Complex) -> Steps[Spots]:
     """Bubbles of a lattice that fills what the first row leaves free."""
     charts = ground.charts
-    seeds, directions, origin = symmetric_seeds(ground, seeds, directions)
     uniform = ground.uniform if charts.region.flat else None
     if uniform is not None and ground.boundary is not None and fills_its_box(charts, uniform):
+        seeds, directions, origin = symmetric_seeds(ground, seeds, directions, anywhere=True)
         clear = CLEAR_OF_RIM * uniform + ground.edge_offset
-        return lay(charts, ground.boundary, uniform, clear, seeds, directions, origin)
+        wanted = partial(led_here, ground, pitch=np.float64(uniform))
+        return lay(charts, ground.boundary, uniform, clear, seeds, directions, origin, wanted)
+    seeds, directions, _ = symmetric_seeds(ground, seeds, directions, anywhere=False)
     closed = np.bincount(charts.region.sheet[charts.region.rim[:, 0]], minlength=len(seeds.row)) == 0
     field = smooth_directions(charts, closed[charts.region.sheet]) if closed.any() else None
     if field is not None:
