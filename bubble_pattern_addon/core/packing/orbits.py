@@ -13,11 +13,12 @@ from scipy.spatial import cKDTree
 
 from ..boundary import signature
 from ..isometries import Isometries, depth, first_alike, image_of, images, settled
-from ..mesh import Bools, Floats, Ints
+from ..mesh import Floats, Ints
 from ..surface import Spots, positions
 from ..symmetry import Symmetry, places_near, rows_near
 from .bubbles import Bubbles, Ground, joined
 from .crowding import close_pairs, uncrowded
+from .domain import led_here
 
 # A bubble nearer to its own image than this, in pitches, stands on the plane or axis instead.
 ON_IT = 0.7
@@ -26,8 +27,6 @@ ON_IT = 0.7
 APART, CROWDED = 0.74, 0.45
 # Who is moved onto a plane may crowd those nearer than this, in pitches.
 BESIDE = 1.5
-# Bubbles this far outside the part of space that is packed, in pitches, may lead as well.
-MARGIN = 0.36
 # Followers this near to a leader, in pitches, are felt by it or may come to be.
 HALO = 3.2
 # Beyond this, in pitches, a void is another domain's to fill.
@@ -99,15 +98,6 @@ def leaders_of(ground: Ground, candidates: Spots, rank: Ints) -> Ints:
     pairs = pairs[(pairs[:, 0] != pairs[:, 1]) & ~lost[pairs].any(axis=1)]
     kept = uncrowded(pairs, np.argsort(np.argsort(rank[inside], kind="stable"))) & ~lost
     return inside[kept]
-
-
-def led_here(ground: Ground, points: Floats, pitch: Floats | np.float64, beyond: float = MARGIN) -> Bools:
-    """Which of the points (n, 3) are in the part of space that leaders are packed in, or no farther `beyond`
-    it than so many pitches, (n,): all without a symmetry.
-    """
-    if ground.symmetry is None:
-        return np.ones(len(points), dtype=bool)
-    return depth(ground.symmetry.group, points) > -beyond * pitch
 
 
 def ranked(ground: Ground, spots: Spots, first: int) -> Ints:

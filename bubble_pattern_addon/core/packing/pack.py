@@ -21,10 +21,11 @@ from ..symmetry import find_symmetry
 from .bubbles import Bubbles, Ground, Pins, can_move, joined
 from .crowding import close_pairs, uncrowded
 from .direction import smooth_directions
+from .domain import all_reached, grown_here, led_here
 from .force import STIFFNESS, stiff_law
 from .lattice import growing_steps
 from .narrows import in_the_narrows
-from .orbits import led_here, orbit_sizes, settled_leaders, symmetric_start, with_followers
+from .orbits import orbit_sizes, settled_leaders, symmetric_start, with_followers
 from .pins import PUSHED, check_apart, clear_of, on_surface, track_through, with_pins
 from .plane import fills_its_box, lay
 from .population import control
@@ -278,7 +279,11 @@ def _lattice(ground: Ground, seeds: Spots, directions: Complex) -> Steps[Spots]:
     field = smooth_directions(charts, closed[charts.region.sheet]) if closed.any() else None
     if field is not None:
         directions = np.where(closed, field[seeds.row] ** (1 / 6), directions)
-    spots, _ = yield from growing_steps(charts, ground.pitch, seeds, directions, MOST, field)
+    wanted = None
+    if ground.symmetry is not None and all_reached(ground, seeds):
+        wanted, own = partial(grown_here, ground), grown_here(ground, seeds)
+        seeds, directions = seeds.take(own), directions[own]
+    spots, _ = yield from growing_steps(charts, ground.pitch, seeds, directions, MOST, field, wanted)
     return _clear_of_rim(ground, spots)
 
 

@@ -11,8 +11,9 @@ from ..mesh import Bools, Floats, Ints
 from ..surface import Charts, Spots, positions, to_frame, walk
 from .bubbles import Bubbles, Ground, joined
 from .crowding import close_pairs, uncrowded
+from .domain import led_here
 from .force import Pairs, find_pairs
-from .orbits import HALO, SEEN, followers_of, leaders_of, led_here, on_their_planes, ranked, settled_leaders
+from .orbits import HALO, SEEN, followers_of, leaders_of, on_their_planes, ranked, settled_leaders
 
 # A circle through three bubbles with no other inside is a void when its radius is above this share of the
 # pitch (it is 0.577 in the hexagonal arrangement, 0.707 in the square one).

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..isometries import images
+from ..isometries import depth, images
 from ..mesh import Bools, Floats, Ints
 from ..surface import Complex, Spots, positions, to_frame, to_space
 from ..symmetry import Symmetry, places_near
@@ -139,6 +139,9 @@ def symmetric_seeds(
                 row[part], bary[part], points[part] = found.row[0], found.barycentric[0], target
                 headings[part] = _rounded(ground, found, _carried(ground, seed, found, headings[part]), turns)
                 break
+        else:
+            found, headings[part] = _led_image(ground, symmetry, seed, headings[part], own[:, part])
+            row[part], bary[part] = found.row[0], found.barycentric[0]
     return Spots(row, bary), headings, points
 
 
@@ -178,6 +181,24 @@ def _still_place(
             break
         target = _still(symmetry, at, turns)
     return found, target[0], float(np.linalg.norm(target - at) / pitch[0])
+
+
+def _led_image(
+    ground: Ground, symmetry: Symmetry, seed: Spots, heading: complex, own: Bools
+) -> tuple[Spots, complex]:
+    """The image of a seed under those of the isometries that are its part's `own`, (k,), that is deepest
+    inside where leaders are packed; and its direction there.
+    """
+    at = images(symmetry.group, positions(ground.charts, seed))[:, 0]
+    number = int(np.where(own, depth(symmetry.group, at), -np.inf).argmax())
+    if number == 0:
+        return seed, heading
+    turn, within = symmetry.group.turns[number], 1e-9 * ground.pitch(seed)
+    normals = ground.charts.region.normals[seed.row] @ turn.T
+    found, _ = places_near(symmetry.finder, at[[number]], normals, within)
+    along = to_space(ground.charts, seed.row, np.array([heading])) @ turn.T
+    there = to_frame(ground.charts, found.row, along)[0]
+    return found, complex(there / abs(there))
 
 
 def _still(symmetry: Symmetry, points: Floats, turns: Floats) -> Floats:
