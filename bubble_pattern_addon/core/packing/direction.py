@@ -10,11 +10,15 @@ Osting, "An Approach to Quad Meshing Based on Harmonic Cross-Valued Maps and the
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.sparse import coo_array, csr_array, diags_array
 
 from ..mesh import Bools, Floats, Ints
 from ..surface import Charts, Complex, product
+
+Alike = Callable[[Complex], Complex]
 
 # Diffusion per round as a share of the area, falling: far misfits first, near ones after.
 SPREAD = (0.003, 0.0005)
@@ -26,9 +30,10 @@ NEARLY = 0.05
 MOST_STEPS = 200
 
 
-def smooth_directions(charts: Charts, chosen: Bools) -> Complex:
+def smooth_directions(charts: Charts, chosen: Bools, alike: Alike | None = None) -> Complex:
     """Sixth powers of unit row directions in the frames of the triangles, (R,); 0 where not `chosen` (R,).
 
+    alike: makes such values (R,) what they shall stay, such as symmetric
     chosen: triangles of whole connected parts
     """
     region = charts.region
@@ -59,14 +64,36 @@ def smooth_directions(charts: Charts, chosen: Bools) -> Complex:
     # The frames' own directions, which are at odds: from a smooth start, such as one direction of space seen
     # on the surface, the misfits that belong to it never part.
     value = np.ones(coarse.shape[0], dtype=np.complex128)
+    kept = None if alike is None else _kept_on_patches(alike, members, len(chosen), patches)
     for spread in SPREAD:
-        value = _diffused(coarse, share, value, spread, ROUNDS)
+        value = _diffused(coarse, share, value, spread, ROUNDS, kept)
     for patch, turn in reversed(patches):
         value = product(value[patch], turn)
     if patches:
         value = _evened(laplacian, value, LAST_ROUNDS)
     result[members] = value
+    if alike is not None:
+        result = alike(result)
+        result[members] /= np.maximum(np.abs(result[members]), 1e-300)
     return result
+
+
+def _kept_on_patches(
+    alike: Alike, members: Ints, triangles: int, patches: list[tuple[Ints, Complex]]
+) -> Callable[[Complex], Complex]:
+    """What `alike` does to triangles, for the values of the coarsest of nested patches, each with its turn."""
+    at, turn = np.arange(len(members)), np.ones(len(members), dtype=np.complex128)
+    for patch, step in patches:
+        at, turn = patch[at], product(turn, step[at])
+
+    def kept(value: Complex) -> Complex:
+        fine = np.zeros(triangles, dtype=np.complex128)
+        fine[members] = product(value[at], turn)
+        back = product(alike(fine)[members], turn.conj())
+        n = len(value)
+        return np.bincount(at, back.real, n) + 1j * np.bincount(at, back.imag, n)
+
+    return kept
 
 
 def _paired(laplacian: csr_array) -> tuple[Ints, Complex]:
@@ -113,11 +140,19 @@ def _evened(laplacian: csr_array, value: Complex, rounds: int) -> Complex:
     return value
 
 
-def _diffused(laplacian: csr_array, area: Floats, value: Complex, spread: float, rounds: int) -> Complex:
+def _diffused(
+    laplacian: csr_array,
+    area: Floats,
+    value: Complex,
+    spread: float,
+    rounds: int,
+    kept: Callable[[Complex], Complex] | None,
+) -> Complex:
     """Unit values after `rounds` of diffusing and normalising."""
     implicit = (diags_array(area.astype(np.complex128)) + spread * laplacian).tocsr()
     for _ in range(rounds):
         value = _solved(implicit, area * value, value)
+        value = value if kept is None else kept(value)
         value = value / np.maximum(np.abs(value), 1e-300)
     return value
 
