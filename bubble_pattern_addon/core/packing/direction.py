@@ -64,9 +64,12 @@ def smooth_directions(charts: Charts, chosen: Bools, alike: Alike | None = None)
     # The frames' own directions, which are at odds: from a smooth start, such as one direction of space seen
     # on the surface, the misfits that belong to it never part.
     value = np.ones(coarse.shape[0], dtype=np.complex128)
-    kept = None if alike is None else _kept_on_patches(alike, members, len(chosen), patches)
     for spread in SPREAD:
-        value = _diffused(coarse, share, value, spread, ROUNDS, kept)
+        value = _diffused(coarse, share, value, spread, ROUNDS)
+    if alike is not None:
+        kept = _kept_on_patches(alike, members, len(chosen), patches)
+        for spread in SPREAD:
+            value = _diffused(coarse, share, _most_alike(kept, value), spread, ROUNDS, kept)
     for patch, turn in reversed(patches):
         value = product(value[patch], turn)
     if patches:
@@ -80,7 +83,7 @@ def smooth_directions(charts: Charts, chosen: Bools, alike: Alike | None = None)
 
 def _kept_on_patches(
     alike: Alike, members: Ints, triangles: int, patches: list[tuple[Ints, Complex]]
-) -> Callable[[Complex], Complex]:
+) -> Alike:
     """What `alike` does to triangles, for the values of the coarsest of nested patches, each with its turn."""
     at, turn = np.arange(len(members)), np.ones(len(members), dtype=np.complex128)
     for patch, step in patches:
@@ -140,13 +143,25 @@ def _evened(laplacian: csr_array, value: Complex, rounds: int) -> Complex:
     return value
 
 
+def _most_alike(kept: Alike, value: Complex) -> Complex:
+    """The values turned, all by the same angle, so that `kept` takes least away from them.
+
+    It is the sum of a linear and an antilinear map, p and m of `value`, as mirrors are the latter: of the
+    values turned by t it makes t p + m / t, which is longest where t^2 p has the direction of m.
+    """
+    one, other = kept(value), kept(1j * value)
+    p, m = (one - 1j * other) / 2, (one + 1j * other) / 2
+    common = np.einsum("n,n->", p.conj(), m)
+    return value * np.exp(0.5j * np.angle(common)) if abs(common) > 0 else value
+
+
 def _diffused(
     laplacian: csr_array,
     area: Floats,
     value: Complex,
     spread: float,
     rounds: int,
-    kept: Callable[[Complex], Complex] | None,
+    kept: Alike | None = None,
 ) -> Complex:
     """Unit values after `rounds` of diffusing and normalising."""
     implicit = (diags_array(area.astype(np.complex128)) + spread * laplacian).tocsr()

@@ -21,7 +21,7 @@ from .crowding import close_pairs, uncrowded
 from .domain import led_here
 
 # A bubble nearer to its own image than this, in pitches, stands on the plane or axis instead.
-ON_IT = 0.7
+ON_IT = 0.6
 # A bubble and an image of another's closer than this, in pitches, do not both fit; nor do two bubbles closer
 # than CROWDED, what is between is left to population control.
 APART, CROWDED = 0.74, 0.45

@@ -28,7 +28,7 @@ from .narrows import in_the_narrows
 from .orbits import orbit_sizes, settled_leaders, symmetric_start, with_followers
 from .pins import PUSHED, check_apart, clear_of, on_surface, track_through, with_pins
 from .plane import fills_its_box, lay
-from .plane_rows import with_plane_rows
+from .plane_rows import rather_along, with_plane_rows
 from .population import control
 from .relax import relax_steps
 from .rim import (
@@ -293,6 +293,7 @@ def _lattice(ground: Ground, seeds: Spots, directions: Complex) -> Steps[Spots]:
     alike = None if ground.symmetry is None else symmetric_mean(ground.symmetry)
     field = smooth_directions(charts, closed[charts.region.sheet], alike) if closed.any() else None
     if field is not None:
+        field = rather_along(ground, field)
         directions = np.where(closed, field[seeds.row] ** (1 / 6), directions)
     wanted = None
     seeds, directions = with_plane_rows(ground, seeds, directions, field)

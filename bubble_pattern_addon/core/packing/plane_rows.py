@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components, depth_first_order
 
-from ..mesh import Bools, Floats, Ints
+from ..mesh import Floats, Ints
 from ..surface import Complex, Spots, positions, to_frame, to_space, walk
 from .bubbles import Ground, joined
 from .crowding import close_pairs, uncrowded
@@ -54,6 +54,34 @@ def with_plane_rows(
     pairs = close_pairs(positions(ground.charts, spots), SAME * ground.pitch(spots))
     kept = uncrowded(pairs, np.arange(len(heading)))
     return spots.take(kept), heading[kept]
+
+
+def rather_along(ground: Ground, field: Complex) -> Complex:
+    """The field, sixth powers of directions in the triangles' frames (R,), or if rows as it says run square
+    to most of the planes' cuts its opposite: rows that are a twelfth of a turn from there.
+
+    Both are symmetric and as smooth, but a whole row on the plane has half as many ways to be at odds.
+    """
+    symmetry = ground.symmetry
+    if symmetry is None or not len(symmetry.group.planes):
+        return field
+    along = 0.0
+    for normal in symmetry.group.planes:
+        for cut, closed in _cuts(ground, normal):
+            if len(cut.row) > 2:
+                step, six = _course(ground, cut, closed)
+                along += float(np.linalg.norm(step, axis=1) @ np.sign(np.real(field[cut.row] * six.conj())))
+    return field if along >= 0 else -field
+
+
+def _course(ground: Ground, cut: Spots, closed: bool) -> tuple[Floats, Complex]:
+    """Steps (n, 3) from each place of a cut to the next, and the sixth powers (n,) of their directions."""
+    points = positions(ground.charts, cut)
+    ahead = np.roll(points, -1, axis=0) - points
+    if not closed:
+        ahead[-1] = ahead[-2]
+    along = to_frame(ground.charts, cut.row, ahead)
+    return ahead, (along / np.maximum(np.abs(along), 1e-300)) ** 6
 
 
 def _cuts(ground: Ground, normal: Floats) -> list[tuple[Spots, bool]]:
@@ -109,16 +137,19 @@ def _row_along(
     if len(cut.row) < 3:
         return None
     points, pitch = positions(charts, cut), ground.pitch(cut)
-    ahead = np.roll(points, -1, axis=0) - points
-    if not closed:
-        ahead[-1] = ahead[-2]
+    ahead, six = _course(ground, cut, closed)
     at_seed = positions(charts, seeds)
     away = np.linalg.norm(points[None] - at_seed[:, None], axis=2)
     seed = int((away / ground.pitch(seeds)[:, None]).min(axis=1).argmin())
     start = int(away[seed].argmin())
     begun = _touches(points, ahead, at_seed[seed], start, float(pitch[start]))
-    square = _square_to(ground, cut, ahead, field, directions[seed] if begun else None, start, seeds, seed)
-    if square is None:
+    if field is not None and (field[cut.row] != 0).all():
+        square = np.real(field[cut.row] * six.conj()) < 0
+    elif begun:
+        across = to_space(charts, seeds.row[[seed]], directions[[seed]])
+        there = to_frame(charts, cut.row[[start]], across) ** 6
+        square = np.broadcast_to(np.real(there * six[start].conj()) < 0, len(six))
+    else:
         return None
     unit = pitch * np.where(square, SECOND, 1.0)
     length = np.linalg.norm(ahead, axis=1) * 2 / (unit + np.roll(unit, -1))
@@ -144,26 +175,3 @@ def _touches(points: Floats, ahead: Floats, seed: Floats, start: int, pitch: flo
     return bool(np.linalg.norm(offset - (offset @ along) * along) < AT_SEED * pitch) and bool(
         np.linalg.norm(offset) < max(pitch, 2 * float(np.linalg.norm(ahead[start])))
     )
-
-
-def _square_to(
-    ground: Ground,
-    cut: Spots,
-    ahead: Floats,
-    field: Complex | None,
-    heading: complex | None,
-    start: int,
-    seeds: Spots,
-    seed: int,
-) -> Bools | None:
-    """Whether rows run square to the cut, at each of its places (n,); None where nothing says."""
-    charts = ground.charts
-    along = to_frame(charts, cut.row, ahead)
-    six = (along / np.maximum(np.abs(along), 1e-300)) ** 6
-    if field is not None and (field[cut.row] != 0).all():
-        return np.real(field[cut.row] * six.conj()) < 0
-    if heading is None:
-        return None
-    across = to_space(charts, seeds.row[[seed]], np.array([heading]))
-    there = to_frame(charts, cut.row[[start]], across)[0]
-    return np.full(len(six), float(np.real((there / abs(there)) ** 6 * six[start].conj())) < 0)
