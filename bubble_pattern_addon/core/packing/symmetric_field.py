@@ -15,8 +15,10 @@ from ..mesh import Ints
 from ..surface import Complex, product
 from ..symmetry import Finder, Symmetry, rows_near
 
+Alike = Callable[[Complex], Complex]
 
-def symmetric_mean(symmetry: Symmetry) -> Callable[[Complex], Complex]:
+
+def symmetric_mean(symmetry: Symmetry) -> Alike:
     """A function of sixth powers of directions in the triangles' frames, (R,): the mean of all images of the
     field that they are.
     """
@@ -48,3 +50,36 @@ def _taken_from(finder: Finder, symmetry: Symmetry, number: int) -> Ints:
     middle = region.corners.mean(axis=1)
     image = image_of(group, np.full(len(middle), back), middle)
     return rows_near(finder, image, region.normals @ group.turns[back].T)
+
+
+def on_patches(alike: Alike, members: Ints, triangles: int, levels: list[tuple[Ints, Complex]]) -> Alike:
+    """What `alike` does to the values of all `triangles`, for those of the largest of nested patches of the
+    triangles `members`.
+
+    levels: for each, from the smallest on, the larger patch that a patch is a part of, and the turn that
+    brings its value into the small one's own frame
+    """
+    at, turn = np.arange(len(members)), np.ones(len(members), dtype=np.complex128)
+    for patch, step in levels:
+        at, turn = patch[at], product(turn, step[at])
+
+    def kept(value: Complex) -> Complex:
+        fine = np.zeros(triangles, dtype=np.complex128)
+        fine[members] = product(value[at], turn)
+        back = product(alike(fine)[members], turn.conj())
+        n = len(value)
+        return np.bincount(at, back.real, n) + 1j * np.bincount(at, back.imag, n)
+
+    return kept
+
+
+def most_alike(kept: Alike, value: Complex) -> Complex:
+    """The values turned, all by the same angle, so that `kept` takes least away from them.
+
+    It is the sum of a linear and an antilinear map, p and m of `value`, as mirrors are the latter: of the
+    values turned by t it makes t p + m / t, which is longest where t^2 p has the direction of m.
+    """
+    one, other = kept(value), kept(1j * value)
+    p, m = (one - 1j * other) / 2, (one + 1j * other) / 2
+    common = np.einsum("n,n->", p.conj(), m)
+    return value * np.exp(0.5j * np.angle(common)) if abs(common) > 0 else value
