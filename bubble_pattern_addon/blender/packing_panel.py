@@ -36,7 +36,7 @@ def draw_hand_work(
     if settings.pins:
         layout.label(text=f"{len(settings.pins):,} pinned", icon='PINNED')
     if settings.hand_made:
-        words = "Settled by hand: Update keeps only pinned features"
+        words = "Settled by hand: Update would keep only pinned features"
         sentences(layout, words, context.region.width, 'INFO')
 
 
