@@ -99,7 +99,7 @@ def at_stake(obj: bpy.types.Object, pins: bool = False, sizes: bool = False) -> 
     words = ["features settled by hand"] if settings.hand_made else []
     found = by_hand(obj)
     if any(found):
-        words.append(f"points {found}")
+        words.append(f"{found} point{'s' if sum(found) > 1 else ''}")
     if pins and len(settings.pins):
         words.append(f"{len(settings.pins):,} pinned")
     if sizes and len(settings.seeds):

@@ -49,11 +49,13 @@ class AnewOperator(SteppedOperator):
         if not lost:
             return super().invoke(context, event)
         self._asked = True
+        obj = pattern_of(context.active_object)
+        stay = self.keeps_pins and obj is not None and len(obj.bubble_pattern.pins)
         return context.window_manager.invoke_confirm(  # type: ignore[no-any-return]
             self,
             event,
             title=f"{self.bl_label}: lose what was done by hand?",
-            message=f"Lost will be: {lost}.",
+            message=f"Lost will be: {lost}.{' Pinned features stay.' if stay else ''}",
             confirm_text=self.bl_label,
             icon='WARNING',
         )

@@ -24,7 +24,7 @@ from .cut_preview import cut_modifiers
 from .hand_state import is_kept
 from .keep_out_properties import keep_out_objects
 from .properties import in_scene, is_pattern, pattern_of
-from .settings_recipe import is_outdated, recipe_of, recipe_text, spoken
+from .settings_recipe import is_outdated, recipe_of, spoken
 from .stepping import PATIENCE, REST
 
 # Changes nearer to each other than this are of one drag of the mouse.
@@ -47,7 +47,6 @@ class Live:
         self.verdicts: dict[int, Verdict] = {}
         self.changed_at = -BURST
         self.waiting: set[int] = set()
-        self.laid: set[tuple[int, str]] = set()
 
 
 _live = Live()
@@ -177,26 +176,10 @@ def can_be_looked_at(base: bpy.types.Object) -> bool:
 
 
 def is_behind(obj: bpy.types.Object) -> bool:
-    """Whether the settings want another pattern than stands there, one that was laid before or is quick."""
+    """Whether the settings want another pattern than stands there, one that would not take long."""
     settings = obj.bubble_pattern
-    if not is_outdated(settings) or settings.trouble or is_kept(obj):
-        return False
-    return settings.seconds <= PATIENCE or was_laid(obj)
-
-
-def was_laid(obj: bpy.types.Object) -> bool:
-    """Whether the pattern has once followed these settings."""
-    try:
-        return (obj.session_uid, recipe_text(recipe_of(obj.bubble_pattern))) in _live.laid
-    except PatternError:
-        return False
-
-
-def note_laid(obj: bpy.types.Object) -> None:
-    """The pattern has followed a change that was put down for undo before: redo shall have it laid again,
-    even where that takes long.
-    """
-    _live.laid.add((obj.session_uid, recipe_text(recipe_of(obj.bubble_pattern))))
+    quick = settings.seconds <= PATIENCE and not is_kept(obj)
+    return is_outdated(settings) and not settings.trouble and quick
 
 
 def patterns_shown() -> Iterator[tuple[bpy.types.Object, bpy.types.Context]]:
@@ -246,7 +229,6 @@ def forget() -> None:
             bpy.app.timers.unregister(action)
     _live.verdicts.clear()
     _live.waiting.clear()
-    _live.laid.clear()
 
 
 def register() -> None:

@@ -118,7 +118,7 @@ def test_what_is_lost_is_said_where_nobody_can_be_asked(capfd: pytest.CaptureFix
     pattern = touched(moved=1, deleted=2)
     said(capfd)
     assert bpy.ops.bubble_pattern.update() == {'FINISHED'}
-    assert "What was done by hand is lost: points 1 moved and 2 deleted" in said(capfd)
+    assert "What was done by hand is lost: 1 moved and 2 deleted points" in said(capfd)
     assert bpy.ops.bubble_pattern.update() == {'FINISHED'}
     assert "lost" not in said(capfd)
     pattern = touched(moved=1)
