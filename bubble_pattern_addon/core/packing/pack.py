@@ -300,12 +300,12 @@ def _lattice(ground: Ground, seeds: Spots, directions: Complex) -> Steps[Spots]:
     if field is not None:
         field = rather_along(ground, field)
         directions = np.where(closed, field[seeds.row] ** (1 / 6), directions)
-    wanted = None
     seeds, directions = with_plane_rows(ground, seeds, directions, field)
+    here = None
     if ground.symmetry is not None and all_reached(ground, seeds):
-        wanted, own = partial(grown_here, ground), grown_here(ground, seeds)
+        here, own = partial(grown_here, ground), grown_here(ground, seeds)
         seeds, directions = seeds.take(own), directions[own]
-    spots, _ = yield from growing_steps(charts, ground.pitch, seeds, directions, MOST, field, wanted)
+    spots, _ = yield from growing_steps(charts, ground.pitch, seeds, directions, MOST, field, here)
     return _clear_of_rim(ground, spots)
 
 
