@@ -18,6 +18,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from scripts.benchmark_adding import add_once, adding, blender
 from scripts.benchmark_packing import curved, flat, graded, pack_once
+from scripts.benchmark_symmetry import symmetric
 from scripts.measuring import installed
 from scripts.shapes import curved_slab
 
@@ -40,6 +41,7 @@ SECTIONS: dict[str, Callable[[int], None]] = {
     "flat": flat,
     "curved": curved,
     "graded": graded,
+    "symmetric": symmetric,
     "adding": adding,
     "blender": blender,
     "preview": preview,
