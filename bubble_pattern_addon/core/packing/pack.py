@@ -26,6 +26,7 @@ from .narrows import in_the_narrows
 from .orbits import orbit_sizes, settled_leaders, symmetric_start, with_followers
 from .pins import PUSHED, check_apart, clear_of, on_surface, track_through, with_pins
 from .plane import fills_its_box, lay
+from .plane_growth import grown_in_plane
 from .population import control
 from .relax import relax_steps
 from .rim import (
@@ -271,6 +272,9 @@ def _lattice(ground: Ground, seeds: Spots, directions: Complex) -> Steps[Spots]:
     if uniform is not None and ground.boundary is not None and fills_its_box(charts, uniform):
         clear = CLEAR_OF_RIM * uniform + ground.edge_offset
         return lay(charts, ground.boundary, uniform, clear, seeds, directions, origin)
+    if charts.region.flat and ground.boundary is not None:
+        asked = ground.pitch, seeds, directions, CLEAR_OF_RIM, ground.edge_offset
+        return (yield from grown_in_plane(charts, ground.boundary, *asked))
     closed = np.bincount(charts.region.sheet[charts.region.rim[:, 0]], minlength=len(seeds.row)) == 0
     field = smooth_directions(charts, closed[charts.region.sheet]) if closed.any() else None
     if field is not None:

@@ -1,0 +1,273 @@
+"""A graded lattice grown in a plane, where the bubbles start in a flat region.
+
+As over a surface (see lattice.py) every bubble of the front sends a step into each of six directions and what
+several propose for one place is averaged; but a plane needs no walks, and the packing metric is read off a
+raster of it: the start needs it no better. Rows are bent as the metric wants them (see bending.py).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..boundary import Boundary, inside_distance
+from ..mesh import Bools, Floats, Ints
+from ..progress import Progress, Snapshot, Steps
+from ..surface import Charts, Complex, Spots, in_plane, nearest_signpost, positions, product, search
+from .crowding import uncrowded
+from .lattice import CROWDED, RECENT, SAME, SIX, Lengths
+from .plane import all_found
+
+# A raster has so many nodes for each bubble that there will be, but neither fewer than FEWEST nor more than
+# MOST_NODES.
+NODES, FEWEST, MOST_NODES = 1.0, 600, 60_000
+# Straight ahead a step is free where no bubble is nearer than this share of the pitch.
+AHEAD = 0.6
+# Where a place in the middle of the region is farther than this from all bubbles, in pitches, the lattice
+# has not come there, as beyond a neck, and another is begun.
+LEFT_OUT = 1.9
+
+
+@dataclass(frozen=True)
+class Raster:
+    """What is known at the nodes of a grid over one part of a flat region, row after row.
+
+    origin: the first node in the plane; spacing: of the nodes; columns: in a row; pitch (k,) and its slope
+    (k,); inside: (k,) distance to the boundary, negative beyond it, and its slope (k,)
+    """
+
+    origin: complex
+    spacing: float
+    columns: int
+    pitch: Floats
+    slope: Complex
+    inside: Floats
+    inward: Complex
+
+
+class Front(NamedTuple):
+    """Bubbles in the plane: places, row directions, pitches and slopes of the pitch there, all (n,)."""
+
+    at: Complex
+    heading: Complex
+    pitch: Floats
+    slope: Complex
+
+
+def grown_in_plane(
+    charts: Charts,
+    boundary: Boundary,
+    pitch: Lengths,
+    seeds: Spots,
+    directions: Complex,
+    clear: float,
+    edge_offset: float,
+) -> Steps[Spots]:
+    """Places of a lattice grown from each of `seeds`, one for each part of a flat region, with a row along
+    the direction that each has, as far as they are farther inside the boundary than `clear` pitches and the
+    edge offset.
+    """
+    found: list[Spots] = []
+    heading = product(directions, charts.plane.turn[seeds.row])
+    for sheet in range(len(seeds.row)):
+        rows = np.flatnonzero(charts.region.sheet == sheet)
+        origin = positions(charts, seeds.take(np.array([sheet])))
+        raster = _raster(charts, boundary, pitch, rows, origin[0])
+        start = in_plane(charts, origin)
+        lattice = yield from _grown(charts, raster, origin[0], start, heading[[sheet]])
+        points = _in_space(charts, origin[0], lattice.at)
+        own = np.full(len(points), rows[0])
+        kept = inside_distance(boundary, points, own) > clear * lattice.pitch + edge_offset
+        points, local = points[kept], lattice.pitch[kept]
+        sought = in_plane(charts, points)
+        spots, there = search(charts, nearest_signpost(charts, sought, rows[:1]), sought)
+        found.append(all_found(charts, spots, there, points, float(local.max(initial=0.0))))
+    return Spots(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+
+
+def _in_space(charts: Charts, origin: Floats, at: Complex) -> Floats:
+    """Points (n, 3) of the plane through `origin` (3,) from complex coordinates (n,)."""
+    off = at - in_plane(charts, origin[None])[0]
+    return origin + np.stack([off.real, off.imag], axis=1) @ charts.axes[0]
+
+
+def _raster(charts: Charts, boundary: Boundary, pitch: Lengths, rows: Ints, origin: Floats) -> Raster:
+    """Raster of the part of the region that has the triangles `rows`, in the plane through `origin` (3,)."""
+    corners = in_plane(charts, charts.region.corners[rows].reshape(-1, 3))
+    low = complex(corners.real.min(), corners.imag.min())
+    wide, high = float(np.ptp(corners.real)), float(np.ptp(corners.imag))
+    local = pitch(Spots(rows, np.full((len(rows), 3), 1 / 3)))
+    area = np.linalg.norm(charts.region.area_vectors[rows], axis=1) / 2
+    wanted = NODES * float((area / local**2).sum()) * wide * high / area.sum()
+    spacing = float(np.sqrt(wide * high / np.clip(wanted, FEWEST, MOST_NODES)))
+    columns, lines = int(np.ceil(wide / spacing)) + 1, int(np.ceil(high / spacing)) + 1
+    nodes = low + spacing * (np.arange(columns) + 1j * np.arange(lines)[:, None]).ravel()
+    points = _in_space(charts, origin, nodes)
+    inside = inside_distance(boundary, points, np.full(len(nodes), rows[0]))
+    post = nearest_signpost(charts, nodes, rows[:1])
+    spots, there = search(charts, post, nodes)
+    # Beyond the boundary the metric goes on as it is in the nearest triangle, within its own bounds.
+    value = pitch(Spots(np.where(there, spots.row, post), _seen_from(charts, spots, post, there, nodes)))
+    known = value[there] if there.any() else local
+    value = np.clip(value, known.min(), known.max())
+    shape = lines, columns
+    return Raster(low, spacing, columns, value, _slope(value, shape, spacing), inside, _slope(inside, shape, spacing))
+
+
+def _seen_from(charts: Charts, spots: Spots, post: Ints, there: Bools, nodes: Complex) -> Floats:
+    """Barycentric coordinates (k, 3) of the nodes in the triangles they are in, or in `post` (k,)."""
+    plane = charts.plane
+    offset = (nodes - plane.origin[post])[:, None]
+    beyond = offset.real * plane.across[post] + offset.imag * plane.along[post]
+    beyond[:, 0] += 1
+    return np.where(there[:, None], spots.barycentric, beyond)
+
+
+def _slope(value: Floats, shape: tuple[int, int], spacing: float) -> Complex:
+    """Slope (k,) of values (k,) at the nodes of a grid of such a shape."""
+    up, across = np.gradient(value.reshape(shape), spacing)
+    return (across + 1j * up).ravel()
+
+
+def _nodes(raster: Raster, at: Complex) -> tuple[Ints, Complex]:
+    """The node nearest to each of `at` (n,), and the way there from it."""
+    place = (at - raster.origin) / raster.spacing
+    column = np.clip(np.rint(place.real), 0, raster.columns - 1)
+    line = np.clip(np.rint(place.imag), 0, len(raster.pitch) // raster.columns - 1)
+    node = (line * raster.columns + column).astype(np.int64)
+    return node, raster.spacing * (place - (column + 1j * line))
+
+
+def _front(raster: Raster, at: Complex, heading: Complex) -> Front:
+    """Bubbles at `at` (n,) with what the raster says there."""
+    node, off = _nodes(raster, at)
+    slope = raster.slope[node]
+    least = 0.3 * raster.pitch[node]
+    return Front(at, heading, np.maximum(raster.pitch[node] + _dot(slope, off), least), slope)
+
+
+def _dot(a: Complex, b: Complex) -> Floats:
+    return a.real * b.real + a.imag * b.imag
+
+
+class _Crowd:
+    """Places of the bubbles born so far, to be asked who is near."""
+
+    def __init__(self) -> None:
+        self.old: list[Complex] = []
+        self.old_tree: cKDTree | None = None
+        self.recent: list[Complex] = []
+        self.recent_tree: cKDTree | None = None
+
+    def add(self, at: Complex) -> None:
+        """Count the bubbles at `at` among those born."""
+        self.recent.append(at)
+        if len(self.recent) > RECENT and sum(map(len, self.recent)) > 0.3 * sum(map(len, self.old)):
+            self.old = [np.concatenate([*self.old, *self.recent[:-RECENT]])]
+            self.old_tree = _tree(self.old[0])
+            self.recent = self.recent[-RECENT:]
+        self.recent_tree = _tree(np.concatenate(self.recent))
+
+    def distance(self, at: Complex, within: float) -> Floats:
+        """Distance from each of `at` to the nearest bubble; infinite beyond `within`."""
+        trees = [tree for tree in (self.old_tree, self.recent_tree) if tree is not None]
+        pairs = at.view(np.float64).reshape(-1, 2)
+        return np.min([tree.query(pairs, distance_upper_bound=within)[0] for tree in trees], axis=0)
+
+
+def _tree(at: Complex) -> cKDTree:
+    return cKDTree(at.view(np.float64).reshape(-1, 2), balanced_tree=False, compact_nodes=False)
+
+
+def _grown(charts: Charts, raster: Raster, origin: Floats, start: Complex, heading: Complex) -> Steps[Front]:
+    """The lattice over one part of the region from one bubble on, generation after generation."""
+    crowd, front = _Crowd(), _front(raster, start, heading)
+    generations = [front]
+    expected = float((raster.inside > 0).sum()) * raster.spacing**2 / float(np.mean(raster.pitch)) ** 2
+    crowd.add(front.at)
+    while len(front.at):
+        if len(generations) % RECENT == 0:
+            total = sum(len(born.at) for born in generations)
+            looks = partial(_snapshot, charts, origin, list(generations))
+            yield Progress("Growing the lattice", total / (total + expected), looks)
+        front = _born(raster, crowd, front)
+        if not len(front.at):
+            front = _elsewhere(raster, generations)
+        if len(front.at):
+            crowd.add(front.at)
+            generations.append(front)
+    return Front(*(np.concatenate(column) for column in zip(*generations, strict=True)))
+
+
+def _snapshot(charts: Charts, origin: Floats, generations: list[Front]) -> Snapshot:
+    points = _in_space(charts, origin, np.concatenate([born.at for born in generations]))
+    normals = np.broadcast_to(charts.region.normals[0], points.shape)
+    return Snapshot(points, normals, np.concatenate([born.pitch for born in generations]))
+
+
+def _elsewhere(raster: Raster, generations: list[Front]) -> Front:
+    """The node that is deepest in what the lattice has left out, as a new start; none where all is filled."""
+    at = np.concatenate([born.at for born in generations])
+    heading = np.concatenate([born.heading for born in generations])
+    deep = np.flatnonzero(raster.inside > 1.2 * raster.pitch)
+    lines, columns = np.divmod(deep, raster.columns)
+    places = raster.origin + raster.spacing * (columns + 1j * lines)
+    distance, near = _tree(at).query(places.view(np.float64).reshape(-1, 2))
+    lonely = np.flatnonzero(distance > LEFT_OUT * raster.pitch[deep])
+    if len(lonely):
+        lonely = lonely[[raster.inside[deep[lonely]].argmax()]]
+    return _front(raster, places[lonely], heading[near[lonely]])
+
+
+def _born(raster: Raster, crowd: _Crowd, front: Front) -> Front:
+    """The next generation."""
+    at, heading = _proposals(raster, crowd, front)
+    if not len(at):
+        return Front(at, heading, at.real, at)
+    local = _front(raster, at, heading)
+    points = at.view(np.float64).reshape(-1, 2)
+    pairs = _tree(at).query_pairs(CROWDED * float(local.pitch.max()), output_type="ndarray")
+    away = np.abs(at[pairs[:, 0]] - at[pairs[:, 1]]) / (local.pitch[pairs[:, 0]] + local.pitch[pairs[:, 1]]) * 2
+    same = away < SAME
+    leader = np.arange(len(at))
+    np.minimum.at(leader, pairs[same, 0], pairs[same, 1])
+    np.minimum.at(leader, pairs[same, 1], pairs[same, 0])
+    leader = leader[leader]
+    _, group = np.unique(leader, return_inverse=True)
+    votes = np.bincount(group)
+    mean = _summed(group, at) / votes
+    six = _summed(group, heading**6)
+    bubbles = _front(raster, mean, np.exp(1j * np.angle(six) / 6))
+    rivals = np.sort(group[pairs[~same]], axis=1)
+    rivals = rivals[rivals[:, 0] != rivals[:, 1]]
+    close = np.abs(mean[rivals[:, 0]] - mean[rivals[:, 1]])
+    rivals = rivals[close < CROWDED * (bubbles.pitch[rivals[:, 0]] + bubbles.pitch[rivals[:, 1]]) / 2]
+    kept = uncrowded(rivals, np.lexsort((np.arange(len(votes)), -votes)).argsort())
+    return Front(*(column[kept] for column in bubbles))
+
+
+def _summed(group: Ints, values: Complex) -> Complex:
+    return np.bincount(group, values.real) + 1j * np.bincount(group, values.imag)
+
+
+def _proposals(raster: Raster, crowd: _Crowd, front: Front) -> tuple[Complex, Complex]:
+    """Places at the stable distance from the front's bubbles where no bubble is yet, and the row directions
+    there, (n,).
+    """
+    way = (front.heading[:, None] * SIX).ravel()
+    at, local, slope = (np.repeat(column, 6) for column in (front.at, front.pitch, front.slope))
+    # A line of the lattice is straight in the metric: it bends away from where the pitch is larger.
+    bend = np.exp(-0.5j * np.clip(_dot(1j * way, slope), -0.5, 0.5))
+    way = way * bend
+    # The stable distance l = (h + (h + s l)) / 2 with the slope s along the way.
+    at = at + way * (local / (1 - np.clip(_dot(way, slope), -0.8, 0.8) / 2))
+    node, off = _nodes(raster, at)
+    inside = raster.inside[node] + _dot(raster.inward[node], off) > 0
+    at, way, bend = at[inside], way[inside], bend[inside]
+    local = _front(raster, at, way).pitch
+    free = crowd.distance(at, CROWDED * float(local.max(initial=0.0))) > CROWDED * local
+    return at[free], (way * bend)[free]
