@@ -30,6 +30,8 @@ SIX = np.exp(1j * np.pi / 3 * np.arange(6))
 # CROWDED, or CROWDED_CLOSED where no boundary gives way and gaps between what has grown apart would stay.
 SAME = 0.5
 CROWDED, CROWDED_CLOSED = 0.78, 0.7
+# No row bends as if the pitch grew faster than by this per length.
+STEEPEST = 0.5
 # Bubbles of so many generations are searched anew for each generation; older ones only when they have become
 # many.
 RECENT = 4
@@ -48,9 +50,17 @@ def grow(
 
 
 def growing_steps(
-    charts: Charts, pitch: Lengths, seeds: Spots, directions: Complex, most: int, field: Complex | None = None
+    charts: Charts,
+    pitch: Lengths,
+    seeds: Spots,
+    directions: Complex,
+    most: int,
+    field: Complex | None = None,
+    bending: bool = False,
 ) -> Steps[tuple[Spots, Complex]]:
-    """Like grow, with a pause after every few generations, in which the bubbles can be looked at."""
+    """Like grow, with a pause after every few generations, in which the bubbles can be looked at; `bending`
+    the rows as a graded pitch wants them.
+    """
     crowded = CROWDED if field is None else CROWDED_CLOSED
     crowd = _Crowd(charts, float(pitch(seeds).max()), crowded)
     spots, heading = seeds, directions
@@ -65,7 +75,7 @@ def growing_steps(
             yield Progress(
                 "Growing the lattice", total / (total + full), partial(_grown, charts, pitch, born)
             )
-        proposals, turned, beyond = _proposals(charts, pitch, crowd, front, front_heading)
+        proposals, turned, beyond = _proposals(charts, pitch, crowd, front, front_heading, bending)
         front, front_heading = _agreed(charts, pitch, crowd, proposals, turned, beyond)
         if field is not None:
             front_heading = _following(front_heading, field[front.row])
@@ -123,7 +133,7 @@ class _Crowd:
 
 
 def _proposals(
-    charts: Charts, pitch: Lengths, crowd: _Crowd, front: Spots, heading: Complex
+    charts: Charts, pitch: Lengths, crowd: _Crowd, front: Spots, heading: Complex, bending: bool
 ) -> tuple[Spots, Complex, Complex]:
     """Places one pitch from the front's bubbles where no bubble is yet, with the row directions carried
     there, and the steps from there, each in its triangle's frame, to what the stable distance is.
@@ -131,22 +141,47 @@ def _proposals(
     parent = np.repeat(np.arange(len(front.row)), 6)
     start = front.take(parent)
     way = product(heading[parent], np.tile(SIX, len(front.row)))
-    length = pitch(front)[parent]
+    local = pitch(front)
+    length = local[parent]
+    bend = np.ones(len(way), dtype=np.complex128)
+    if bending:
+        bend = half_bend(way, _slope(charts, pitch, front, local)[parent])
+        way = product(way, bend)
     # A straight look ahead spares walking to places that are taken.
     ahead = crowd.where(start)
     ahead[:, :3] += to_space(charts, start.row, way * length)
     free = crowd.distance(ahead, 0.6 * length.max()) > 0.6 * length
-    start, way, length = start.take(free), way[free], length[free]
+    start, way, length, bend = start.take(free), way[free], length[free], bend[free]
     walked = walk(charts, start, way * length, carried=way, stopping=False)
     inside = walked.left == 0
-    arrived, carried = walked.arrived.take(inside), walked.carried[inside]
+    arrived, carried, bend = walked.arrived.take(inside), walked.carried[inside], bend[inside]
     # The stable distance is the mean of both pitches: on, or back, by half of what they differ.
     lacking = carried * (pitch(arrived) - length[inside]) / 2
     if charts.region.flat or np.all(np.abs(lacking) < 1e-9 * length.max(initial=1.0)):
-        return arrived, carried, lacking
+        return arrived, product(carried, bend), lacking
     again = walk(charts, arrived, lacking, carried=carried, stopping=False)
     inside = again.left == 0
-    return again.arrived.take(inside), again.carried[inside], np.zeros(int(inside.sum()), np.complex128)
+    return again.arrived.take(inside), product(again.carried, bend)[inside], np.zeros(int(inside.sum()), np.complex128)
+
+
+def half_bend(way: Complex, slope: Complex) -> Complex:
+    """Half the unit turns (n,) of a row of the lattice over steps of one pitch along `way` (n,), where the
+    pitch has the `slope` (n,).
+
+    A row is straight where lengths are counted in pitches h: a geodesic of the metric 1/h^2, which turns by
+    -(dh/dn)/h per length away from the side n where the pitch is larger. Rows that were straight in space
+    would have to end one after the other: a dislocation for every unit that the pitch grows by per bubble.
+    """
+    across = way.real * slope.imag - way.imag * slope.real
+    return np.exp(-0.5j * np.clip(across, -STEEPEST, STEEPEST))
+
+
+def _slope(charts: Charts, pitch: Lengths, spots: Spots, local: Floats) -> Complex:
+    """Slope (n,) of the pitch at the places, where it is `local` (n,), in their triangles' frames."""
+    step = 1e-4 * local
+    gradients = charts.gradients[spots.row] * step[:, None]
+    beside = [pitch(Spots(spots.row, spots.barycentric + part)) for part in (gradients.real, gradients.imag)]
+    return ((beside[0] - local) + 1j * (beside[1] - local)) / step
 
 
 def _agreed(

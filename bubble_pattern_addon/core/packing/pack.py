@@ -279,7 +279,8 @@ def _lattice(ground: Ground, seeds: Spots, directions: Complex) -> Steps[Spots]:
     field = smooth_directions(charts, closed[charts.region.sheet]) if closed.any() else None
     if field is not None:
         directions = np.where(closed, field[seeds.row] ** (1 / 6), directions)
-    spots, _ = yield from growing_steps(charts, ground.pitch, seeds, directions, MOST, field)
+    bending = ground.uniform is None and field is None
+    spots, _ = yield from growing_steps(charts, ground.pitch, seeds, directions, MOST, field, bending)
     return _clear_of_rim(ground, spots)
 
 

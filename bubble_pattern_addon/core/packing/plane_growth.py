@@ -2,7 +2,7 @@
 
 As over a surface (see lattice.py) every bubble of the front sends a step into each of six directions and what
 several propose for one place is averaged; but a plane needs no walks, and the packing metric is read off a
-raster of it: the start needs it no better. Rows are bent as the metric wants them (see bending.py).
+raster of it: the start needs it no better. Rows are bent as the metric wants them (see lattice.half_bend).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ..mesh import Bools, Floats, Ints
 from ..progress import Progress, Snapshot, Steps
 from ..surface import Charts, Complex, Spots, in_plane, nearest_signpost, positions, product, search
 from .crowding import uncrowded
-from .lattice import CROWDED, RECENT, SAME, SIX, Lengths
+from .lattice import CROWDED, RECENT, SAME, SIX, Lengths, half_bend
 from .plane import all_found
 
 # A raster has so many nodes for each bubble that there will be, but neither fewer than FEWEST nor more than
@@ -260,8 +260,7 @@ def _proposals(raster: Raster, crowd: _Crowd, front: Front) -> tuple[Complex, Co
     """
     way = (front.heading[:, None] * SIX).ravel()
     at, local, slope = (np.repeat(column, 6) for column in (front.at, front.pitch, front.slope))
-    # A line of the lattice is straight in the metric: it bends away from where the pitch is larger.
-    bend = np.exp(-0.5j * np.clip(_dot(1j * way, slope), -0.5, 0.5))
+    bend = half_bend(way, slope)
     way = way * bend
     # The stable distance l = (h + (h + s l)) / 2 with the slope s along the way.
     at = at + way * (local / (1 - np.clip(_dot(way, slope), -0.8, 0.8) / 2))
