@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..boundary import make_boundary, nearest_boundary, signature
 from ..errors import RegionError
 from ..isometries import OFF
-from ..mesh import Floats
+from ..mesh import Bools, Floats
 from ..metric import Constant, Field
 from ..progress import Progress, Steps, within
 from ..quality import measure_points
@@ -58,6 +59,8 @@ CRAMPED = 1.02
 # Rounds of relaxation and population control, and how many steps each may take; the last phases' steps.
 ROUNDS, ROUNDS_GRADED = 3, 2
 STIFF_STEPS, LAST_ROUNDS = 45, 4
+# Whoever comes or goes in the last phases stirs others so far away, in pitches.
+STIRRED = 6.0
 NOT_SYMMETRIC = "The pattern is not symmetric: some of its features are placed by hand."
 
 
@@ -161,6 +164,7 @@ def _settled(
         if not changed:
             break
     yield Progress("Evening out the gaps", 0.8)
+    moving: Bools | None = None
     for number in range(LAST_ROUNDS):
         local = local_pitch(ground, bubbles)
         size, stiffness = filling(ground, bubbles, local), 1.0 + STIFFNESS
@@ -172,18 +176,31 @@ def _settled(
             packing.tolerance,
             stiff_law,
             stiffness,
+            moving,
             stage="Evening out the gaps",
         )
         bubbles, _ = yield from within(evening, 0.8, 0.95)
         # What stiff contacts have squeezed through the first row has no place between it and the boundary,
         # and what these have opened another bubble may fit into.
         local, more = local_pitch(ground, bubbles), number + 1 < LAST_ROUNDS
+        before = bubbles
         bubbles, changed = control(ground, bubbles, local, last=True, filling=more)
         if not changed:
             break
+        if ground.uniform is None and ground.symmetry is None:
+            moving = _near_changes(ground, before, bubbles)
     if ground.symmetry is not None:
         bubbles = with_followers(ground, settled_leaders(ground, bubbles))
     return bubbles
+
+
+def _near_changes(ground: Ground, before: Bubbles, after: Bubbles) -> Bools:
+    """Which of the bubbles `after` population control may move, (n,): those near whoever has come or gone."""
+    then, now = (positions(ground.charts, bubbles.spots) for bubbles in (before, after))
+    old, new = cKDTree(then), cKDTree(now)
+    came, went = old.query(now)[0] > 0, new.query(then)[0] > 0
+    changes = cKDTree(np.concatenate([now[came], then[went]]))
+    return np.asarray(changes.query(now)[0] < STIRRED * local_pitch(ground, after))
 
 
 def filling(ground: Ground, bubbles: Bubbles, local: Floats) -> Floats:

@@ -24,7 +24,7 @@ from .plane import all_found
 
 # A raster has so many nodes for each bubble that there will be, but neither fewer than FEWEST nor more than
 # MOST_NODES.
-NODES, FEWEST, MOST_NODES = 1.0, 600, 60_000
+NODES, FEWEST, MOST_NODES = 0.5, 500, 30_000
 # Straight ahead a step is free where no bubble is nearer than this share of the pitch.
 AHEAD = 0.6
 # Where a place in the middle of the region is farther than this from all bubbles, in pitches, the lattice

@@ -25,6 +25,8 @@ SKIN = 0.16
 # Pairs of bubbles of different sizes take long to find: they are listed out to this reserve as well, which
 # holds for several of the shorter lists: until a bubble has moved so far, in pitches.
 WIDE_SKIN, WIDE_MOVED = 0.7, 0.4
+# Where a smaller share of the bubbles has moved, listing their pairs alone is quicker than all anew.
+RENEWABLE = 0.3
 # Where fewer bubbles are at work, telling some apart from the others costs more than it spares.
 FEW = 3000
 # How far bubbles may move between two landings, in pitches: AFLOAT at first, then so far that by what they
@@ -122,13 +124,27 @@ def _pairs_now(swarm: Swarm) -> Pairs:
     if swarm.ground.uniform is not None:
         return find_pairs(charts, points, row, pitch, SKIN)
     if swarm.wide is not None:
-        away = points - swarm.wide[1]
-        shift = np.einsum("nc,nc->n", away, away) / pitch**2
-        if shift.max(initial=0.0) > WIDE_MOVED**2:
-            swarm.wide = None
+        _renew_wide(swarm)
     if swarm.wide is None:
         swarm.wide = find_pairs(charts, points, row, pitch, WIDE_SKIN), points.copy()
     return within_reach(swarm.wide[0], points, SKIN)
+
+
+def _renew_wide(swarm: Swarm) -> None:
+    """Bring the wide list up to date, or drop it, where bubbles have moved farther than it allows for."""
+    assert swarm.wide is not None
+    pairs, listed_at = swarm.wide
+    charts, points, pitch = swarm.ground.charts, swarm.points, swarm.pitch
+    away = points - listed_at
+    shift = np.einsum("nc,nc->n", away, away) / pitch**2
+    if shift.max(initial=0.0) <= WIDE_MOVED**2:
+        return
+    stale = np.flatnonzero(shift > (WIDE_MOVED / 2) ** 2)
+    if len(stale) > RENEWABLE * len(points):
+        swarm.wide = None
+        return
+    listed_at[stale] = points[stale]
+    swarm.wide = renewed_pairs(pairs, stale, charts, points, swarm.row, pitch, WIDE_SKIN), listed_at
 
 
 def follow(swarm: Swarm) -> None:
@@ -282,7 +298,7 @@ def list_anew(swarm: Swarm, active: Ints, beyond: float) -> bool:
         moved[len(swarm.bubbles) :] = moved[swarm.followers.leader]
     stale = np.flatnonzero(moved)
     charts, points, row, pitch = swarm.ground.charts, swarm.points, swarm.row, swarm.pitch
-    if len(stale) > 0.3 * len(points) or len(points) < FEW:
+    if len(stale) > RENEWABLE * len(points) or len(points) < FEW:
         swarm.pairs = _pairs_now(swarm)
         swarm.listed_at, swarm.strayed = points.copy(), 0.0
     else:
