@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -56,8 +57,11 @@ TURNS = (0.0, 15.0, 30.0, 45.0)
 # Where nothing holds the bubbles together they are packed at this share of the pitch that would fill the
 # surface exactly.
 CRAMPED = 1.02
-# Rounds of relaxation and population control, and how many steps each may take; the last phases' steps.
-ROUNDS, ROUNDS_GRADED = 3, 2
+# Rounds of relaxation and population control, by the share of the recipe's steps that each may take: whoever
+# comes or goes after the first stirs but a few neighbours, and in a graded pattern soonest gone is best. The
+# last phases' steps.
+ROUNDS = (Fraction(1), Fraction(1, 2), Fraction(1, 2))
+ROUNDS_GRADED = (Fraction(2, 3), Fraction(1, 3))
 STIFF_STEPS, LAST_ROUNDS = 45, 4
 # Whoever comes or goes in the last phases stirs others so far away, in pitches.
 STIRRED = 6.0
@@ -152,12 +156,11 @@ def _settled(
             "No bubble fits into the target region: it is narrower than one pitch everywhere; use a smaller "
             "pitch or a larger region."
         )
-    for number in range(ROUNDS if ground.uniform is not None else ROUNDS_GRADED):
+    for number, share in enumerate(ROUNDS if ground.uniform is not None else ROUNDS_GRADED):
         yield Progress("Packing the bubbles", 0.2 + 0.2 * number)
         local = local_pitch(ground, bubbles)
         settle = relax_steps if packing.integrator == "fire" else integration_steps
-        # Whoever comes or goes after the first round stirs but a few neighbours.
-        steps = max(packing.iterations // (2 if number > 0 else 1), 1)
+        steps = max(int(packing.iterations * share), 1)
         settling = settle(ground, bubbles, filling(ground, bubbles, local), steps, packing.tolerance)
         bubbles, _ = yield from within(settling, 0.2 + 0.2 * number, 0.4 + 0.2 * number)
         bubbles, changed = control(ground, bubbles, local)
