@@ -165,7 +165,11 @@ def _proposals(
         return arrived, product(carried, bend), lacking
     again = walk(charts, arrived, lacking, carried=carried, stopping=False)
     inside = again.left == 0
-    return again.arrived.take(inside), product(again.carried, bend)[inside], np.zeros(int(inside.sum()), np.complex128)
+    return (
+        again.arrived.take(inside),
+        product(again.carried, bend)[inside],
+        np.zeros(int(inside.sum()), np.complex128),
+    )
 
 
 def half_bend(way: Complex, slope: Complex) -> Complex:

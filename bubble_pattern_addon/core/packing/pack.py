@@ -187,7 +187,7 @@ def _settled(
         # and what these have opened another bubble may fit into.
         local, more = local_pitch(ground, bubbles), number + 1 < LAST_ROUNDS
         before = bubbles
-        bubbles, changed = control(ground, bubbles, local, last=True, filling=more)
+        bubbles, changed = control(ground, bubbles, local, True, more, among=moving)
         if not changed:
             break
         if ground.uniform is None and ground.symmetry is None:

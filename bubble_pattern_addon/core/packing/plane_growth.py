@@ -24,9 +24,9 @@ from .plane import all_found
 
 # A raster has so many nodes for each bubble that there will be, but neither fewer than FEWEST nor more than
 # MOST_NODES.
-NODES, FEWEST, MOST_NODES = 0.5, 500, 30_000
-# Straight ahead a step is free where no bubble is nearer than this share of the pitch.
-AHEAD = 0.6
+NODES, FEWEST, MOST_NODES = 0.4, 500, 30_000
+# From a node to the places round it the pitch does not fall below this share of itself.
+LEAST = 0.3
 # Where a place in the middle of the region is farther than this from all bubbles, in pitches, the lattice
 # has not come there, as beyond a neck, and another is begun.
 LEFT_OUT = 1.9
@@ -79,9 +79,12 @@ def grown_in_plane(
         raster = _raster(charts, boundary, pitch, rows, origin[0])
         start = in_plane(charts, origin)
         lattice = yield from _grown(charts, raster, origin[0], start, heading[[sheet]])
-        points = _in_space(charts, origin[0], lattice.at)
-        own = np.full(len(points), rows[0])
-        kept = inside_distance(boundary, points, own) > clear * lattice.pitch + edge_offset
+        points, enough = _in_space(charts, origin[0], lattice.at), clear * lattice.pitch + edge_offset
+        # A distance changes by no more than the way: who is far inside need not be measured.
+        node, off = _nodes(raster, lattice.at)
+        kept = raster.inside[node] - np.abs(off) > enough
+        near = np.flatnonzero(~kept)
+        kept[near] = inside_distance(boundary, points[near], np.full(len(near), rows[0])) > enough[near]
         points, local = points[kept], lattice.pitch[kept]
         sought = in_plane(charts, points)
         spots, there = search(charts, nearest_signpost(charts, sought, rows[:1]), sought)
@@ -115,7 +118,9 @@ def _raster(charts: Charts, boundary: Boundary, pitch: Lengths, rows: Ints, orig
     known = value[there] if there.any() else local
     value = np.clip(value, known.min(), known.max())
     shape = lines, columns
-    return Raster(low, spacing, columns, value, _slope(value, shape, spacing), inside, _slope(inside, shape, spacing))
+    return Raster(
+        low, spacing, columns, value, _slope(value, shape, spacing), inside, _slope(inside, shape, spacing)
+    )
 
 
 def _seen_from(charts: Charts, spots: Spots, post: Ints, there: Bools, nodes: Complex) -> Floats:
@@ -142,12 +147,16 @@ def _nodes(raster: Raster, at: Complex) -> tuple[Ints, Complex]:
     return node, raster.spacing * (place - (column + 1j * line))
 
 
+def _pitch_near(raster: Raster, node: Ints, off: Complex) -> Floats:
+    """The pitch (n,) at a way `off` from the nodes."""
+    there = raster.pitch[node]
+    return np.maximum(there + _dot(raster.slope[node], off), LEAST * there)
+
+
 def _front(raster: Raster, at: Complex, heading: Complex) -> Front:
     """Bubbles at `at` (n,) with what the raster says there."""
     node, off = _nodes(raster, at)
-    slope = raster.slope[node]
-    least = 0.3 * raster.pitch[node]
-    return Front(at, heading, np.maximum(raster.pitch[node] + _dot(slope, off), least), slope)
+    return Front(at, heading, _pitch_near(raster, node, off), raster.slope[node])
 
 
 def _dot(a: Complex, b: Complex) -> Floats:
@@ -172,15 +181,23 @@ class _Crowd:
             self.recent = self.recent[-RECENT:]
         self.recent_tree = _tree(np.concatenate(self.recent))
 
-    def distance(self, at: Complex, within: float) -> Floats:
-        """Distance from each of `at` to the nearest bubble; infinite beyond `within`."""
-        trees = [tree for tree in (self.old_tree, self.recent_tree) if tree is not None]
-        pairs = at.view(np.float64).reshape(-1, 2)
-        return np.min([tree.query(pairs, distance_upper_bound=within)[0] for tree in trees], axis=0)
+    def free(self, at: Complex, distance: Floats) -> Ints:
+        """Which of `at` (n,) no bubble is nearer to than its `distance` (n,)."""
+        kept = np.arange(len(at))
+        for tree in (self.recent_tree, self.old_tree):
+            if tree is not None and len(kept):
+                away = tree.query(_pairs(at[kept]), distance_upper_bound=float(distance[kept].max()))[0]
+                kept = kept[away > distance[kept]]
+        return kept
+
+
+def _pairs(at: Complex) -> Floats:
+    """Real and imaginary parts, (n, 2)."""
+    return at.view(np.float64).reshape(-1, 2)
 
 
 def _tree(at: Complex) -> cKDTree:
-    return cKDTree(at.view(np.float64).reshape(-1, 2), balanced_tree=False, compact_nodes=False)
+    return cKDTree(_pairs(at), balanced_tree=False, compact_nodes=False)
 
 
 def _grown(charts: Charts, raster: Raster, origin: Floats, start: Complex, heading: Complex) -> Steps[Front]:
@@ -216,7 +233,7 @@ def _elsewhere(raster: Raster, generations: list[Front]) -> Front:
     deep = np.flatnonzero(raster.inside > 1.2 * raster.pitch)
     lines, columns = np.divmod(deep, raster.columns)
     places = raster.origin + raster.spacing * (columns + 1j * lines)
-    distance, near = _tree(at).query(places.view(np.float64).reshape(-1, 2))
+    distance, near = _tree(at).query(_pairs(places))
     lonely = np.flatnonzero(distance > LEFT_OUT * raster.pitch[deep])
     if len(lonely):
         lonely = lonely[[raster.inside[deep[lonely]].argmax()]]
@@ -224,29 +241,26 @@ def _elsewhere(raster: Raster, generations: list[Front]) -> Front:
 
 
 def _born(raster: Raster, crowd: _Crowd, front: Front) -> Front:
-    """The next generation."""
-    at, heading = _proposals(raster, crowd, front)
+    """The next generation: what the front proposes, one bubble for each group that means the same place."""
+    at, heading, local = _proposals(raster, crowd, front)
     if not len(at):
-        return Front(at, heading, at.real, at)
-    local = _front(raster, at, heading)
-    points = at.view(np.float64).reshape(-1, 2)
-    pairs = _tree(at).query_pairs(CROWDED * float(local.pitch.max()), output_type="ndarray")
-    away = np.abs(at[pairs[:, 0]] - at[pairs[:, 1]]) / (local.pitch[pairs[:, 0]] + local.pitch[pairs[:, 1]]) * 2
-    same = away < SAME
+        return Front(at, heading, local, at)
+    first, second = _tree(at).query_pairs(CROWDED * float(local.max()), output_type="ndarray").T
+    same = np.abs(at[first] - at[second]) < SAME * (local[first] + local[second]) / 2
     leader = np.arange(len(at))
-    np.minimum.at(leader, pairs[same, 0], pairs[same, 1])
-    np.minimum.at(leader, pairs[same, 1], pairs[same, 0])
-    leader = leader[leader]
-    _, group = np.unique(leader, return_inverse=True)
+    np.minimum.at(leader, first[same], second[same])
+    np.minimum.at(leader, second[same], first[same])
+    while not np.array_equal(leader[leader], leader):
+        leader = leader[leader]
+    group = (np.cumsum(leader == np.arange(len(at))) - 1)[leader]
     votes = np.bincount(group)
-    mean = _summed(group, at) / votes
     six = _summed(group, heading**6)
-    bubbles = _front(raster, mean, np.exp(1j * np.angle(six) / 6))
-    rivals = np.sort(group[pairs[~same]], axis=1)
-    rivals = rivals[rivals[:, 0] != rivals[:, 1]]
-    close = np.abs(mean[rivals[:, 0]] - mean[rivals[:, 1]])
-    rivals = rivals[close < CROWDED * (bubbles.pitch[rivals[:, 0]] + bubbles.pitch[rivals[:, 1]]) / 2]
-    kept = uncrowded(rivals, np.lexsort((np.arange(len(votes)), -votes)).argsort())
+    bubbles = _front(raster, _summed(group, at) / votes, np.exp(1j * np.angle(six) / 6))
+    first, second = group[first[~same]], group[second[~same]]
+    reach = CROWDED * (bubbles.pitch[first] + bubbles.pitch[second]) / 2
+    close = (first != second) & (np.abs(bubbles.at[first] - bubbles.at[second]) < reach)
+    rank = np.lexsort((np.arange(len(votes)), -votes)).argsort()
+    kept = uncrowded(np.stack([first[close], second[close]], axis=1), rank)
     return Front(*(column[kept] for column in bubbles))
 
 
@@ -254,9 +268,9 @@ def _summed(group: Ints, values: Complex) -> Complex:
     return np.bincount(group, values.real) + 1j * np.bincount(group, values.imag)
 
 
-def _proposals(raster: Raster, crowd: _Crowd, front: Front) -> tuple[Complex, Complex]:
+def _proposals(raster: Raster, crowd: _Crowd, front: Front) -> tuple[Complex, Complex, Floats]:
     """Places at the stable distance from the front's bubbles where no bubble is yet, and the row directions
-    there, (n,).
+    and pitches there, (n,).
     """
     way = (front.heading[:, None] * SIX).ravel()
     at, local, slope = (np.repeat(column, 6) for column in (front.at, front.pitch, front.slope))
@@ -265,8 +279,8 @@ def _proposals(raster: Raster, crowd: _Crowd, front: Front) -> tuple[Complex, Co
     # The stable distance l = (h + (h + s l)) / 2 with the slope s along the way.
     at = at + way * (local / (1 - np.clip(_dot(way, slope), -0.8, 0.8) / 2))
     node, off = _nodes(raster, at)
-    inside = raster.inside[node] + _dot(raster.inward[node], off) > 0
-    at, way, bend = at[inside], way[inside], bend[inside]
-    local = _front(raster, at, way).pitch
-    free = crowd.distance(at, CROWDED * float(local.max(initial=0.0))) > CROWDED * local
-    return at[free], (way * bend)[free]
+    inside = np.flatnonzero(raster.inside[node] + _dot(raster.inward[node], off) > 0)
+    at, heading = at[inside], (way * bend)[inside]
+    local = _pitch_near(raster, node[inside], off[inside])
+    free = crowd.free(at, CROWDED * local)
+    return at[free], heading[free], local[free]

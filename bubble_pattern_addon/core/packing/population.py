@@ -46,13 +46,18 @@ def overlap_ratio(pairs: Pairs, distance: Floats, pitch: Floats) -> Floats:
 
 
 def control(
-    ground: Ground, bubbles: Bubbles, pitch: Floats, last: bool = False, filling: bool = True
+    ground: Ground,
+    bubbles: Bubbles,
+    pitch: Floats,
+    last: bool = False,
+    filling: bool = True,
+    among: Bools | None = None,
 ) -> tuple[Bubbles, int]:
     """Bubbles without the too crowded ones and with new ones in the voids; and how many came or went.
 
     In a symmetric pattern these are the leaders, and whoever comes or goes does so with its followers. At
     the `last` only those that are pressed out go, and only voids that another bubble fits into are filled,
-    if there is to be any `filling`.
+    if there is to be any `filling`; only between bubbles `among` (n,) of these, if that is given.
     """
     spots, n, m = bubbles.spots, len(bubbles), bubbles.fixed
     owner = np.arange(n)
@@ -69,6 +74,7 @@ def control(
         gone[m:] |= _too_crowded(pairs, distance / pairs.stable, ratio[:n], owner, m, most)
     lonely, least = np.flatnonzero(ratio < LONELY), LAST_VOID if last else VOID
     lonely = lonely if filling else lonely[:0]
+    lonely = lonely if among is None else lonely[among[owner[lonely]]]
     added = _voids(ground, points, row, everywhere, lonely, pairs, least)
     if not gone.any() and not len(added.row):
         return bubbles, 0
