@@ -30,9 +30,9 @@ SIX = np.exp(1j * np.pi / 3 * np.arange(6))
 # CROWDED, or CROWDED_CLOSED where no boundary gives way and gaps between what has grown apart would stay.
 SAME = 0.5
 CROWDED, CROWDED_CLOSED = 0.78, 0.7
-# Rows bend by this share of what the grading of the pitch asks for: the rest is left to a few dislocations, and
-# rows that begin along a boundary stay with it longer. (Between 0.65 and 0.8 patterns of both kinds have the
-# best order, by a family of linear and radial gradings.)
+# Rows bend by this share of what the grading of the pitch asks for: the rest is left to a few dislocations,
+# and rows that begin along a boundary stay with it longer (best for order, by a family of linear and radial
+# gradings; 0.65 and 0.9 are nearly as good).
 BENT = 0.8
 # No row bends as if the pitch grew faster than by this per length.
 STEEPEST = 0.5
