@@ -14,6 +14,7 @@ from ..core.sides import check_one_side
 from ..core.solid import Part, Plan, cutting_seconds
 from .feature_objects import stamp_of
 from .generation import renewing_steps, show_part
+from .hand_state import check_settled
 from .live import has_window
 from .part_mesh import build_part_mesh
 from .pattern_object import read_pattern
@@ -36,6 +37,7 @@ def apply_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[tupl
     owners = applied_with(obj)
     for owner in owners:
         settings = owner.bubble_pattern
+        check_settled(owner)
         recipe = recipe_of(settings)
         source = read_source(base_object, settings.region, context, recipe)
         if recipe.feature.through:

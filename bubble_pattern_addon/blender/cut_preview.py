@@ -55,9 +55,11 @@ def show_cut(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     """
     from ..core.solid import plan_steps
     from .feature_objects import stamp_of
+    from .hand_state import check_settled
     from .pattern_object import read_pattern
     from .sources import read_source
 
+    check_settled(obj)
     settings = obj.bubble_pattern
     base, recipe = settings.base, recipe_of(settings)
     source = read_source(base, settings.region, context, recipe)

@@ -21,6 +21,7 @@ from ..core.pattern import Pattern
 from ..core.recipe import DRAWINGS, FORMATS
 from ..core.region import Region
 from ..core.toml_values import Point
+from .hand_state import check_settled
 from .pattern_object import read_pattern
 from .properties import in_scene
 from .reading import evaluated_mesh, read_base, shown, transformed
@@ -104,6 +105,7 @@ def laid(obj: bpy.types.Object, context: bpy.types.Context) -> tuple[Region, Pat
     """Region and features of a pattern that is up to date, in coordinates of the world, and how many
     millimetres one of its units is.
     """
+    check_settled(obj)
     settings = obj.bubble_pattern
     source = read_source(settings.base, settings.region, context, recipe_of(settings))
     now = (source.fingerprint, source.size_trace)

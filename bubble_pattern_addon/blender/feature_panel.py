@@ -19,14 +19,14 @@ class BUBBLE_PATTERN_PT_feature(SettingsPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         settings = shown_settings(context)
+        self.layout.row().prop(settings, "kind", expand=True)  # all of a narrow sidebar's width
         column = columns(self.layout)
-        column.row().prop(settings, "kind", expand=True)
         draw_profile(column, settings)
         column.separator()
         if settings.kind == 'HOLE':
             draw_hole(column, settings)
         elif settings.kind == 'DIMPLE':
-            draw_field(column, settings, "dimple_depth", "depth_field", False, "Depth")
+            draw_field(column, settings, "dimple_depth", "depth_field", "size", "Depth")
         else:
             draw_bump(column, settings)
 
@@ -36,7 +36,7 @@ def draw_profile(column: bpy.types.UILayout, settings: Any) -> None:
     column.prop(settings, "profile")
     profile = settings.profile.lower()
     if profile in ASPECTS:
-        draw_field(column, settings, "aspect", "aspect_field", True, "Aspect")
+        draw_field(column, settings, "aspect", "aspect_field", "share", "Aspect")
     if profile == "polygon":
         column.prop(settings, "corners")
     if profile in ROUNDED:
@@ -53,7 +53,7 @@ def draw_hole(column: bpy.types.UILayout, settings: Any) -> None:
     """Draw what goes with holes."""
     column.row().prop(settings, "depth_mode", expand=True)
     if settings.depth_mode == 'BLIND':
-        draw_field(column, settings, "depth", "depth_field", False, " ")
+        draw_field(column, settings, "depth", "depth_field", "size", " ")
     if settings.profile != 'MESH':
         draw_walls(column, settings)
 
@@ -62,7 +62,7 @@ def draw_bump(column: bpy.types.UILayout, settings: Any) -> None:
     """Draw what goes with bumps."""
     if settings.profile != 'MESH':
         column.row().prop(settings, "form", expand=True)
-    draw_field(column, settings, "height", "depth_field", False, "Height")
+    draw_field(column, settings, "height", "depth_field", "size", "Height")
     if settings.form == 'BOSS' and settings.profile != 'MESH':
         draw_walls(column, settings)
 
@@ -74,13 +74,23 @@ def draw_walls(column: bpy.types.UILayout, settings: Any) -> None:
         column.prop(settings, "rim_size", text="Size")
     if settings.rim == 'CHAMFER':
         column.prop(settings, "rim_angle", text="Angle")
-    draw_angle(column, settings, "draft")
+    draw_field(column, settings, "draft", "draft_field", "angle", "Draft")
 
 
-def draw_angle(column: bpy.types.UILayout, settings: Any, name: str) -> None:
-    """Draw an angle, or the text of its field where a recipe has brought one."""
-    varies = bool(getattr(settings, f"{name}_text"))
-    column.prop(settings, f"{name}_text" if varies else name, text=name.title())
+def draw_turn(column: bpy.types.UILayout, settings: Any) -> None:
+    """Draw where the features head."""
+    column.prop(settings, "turn", text="Along")
+    if settings.turn == 'FIXED':
+        column.prop(settings, "turn_direction")
+    elif settings.turn in {'TOWARDS', 'AROUND'}:
+        column.prop(settings, "turn_object")
+        if settings.turn_object is None:
+            column.prop(settings, "turn_point")
+    elif settings.turn == 'ATTRIBUTE':
+        column.prop(settings, "turn_attribute")
+    elif settings.turn == 'RANDOM':
+        column.prop(settings, "turn_seed")
+    draw_field(column, settings, "angle", "angle_field", "angle", "Angle")
 
 
 class FeaturePart(SettingsPanel):
@@ -103,19 +113,7 @@ class BUBBLE_PATTERN_PT_feature_turn(FeaturePart, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         settings = shown_settings(context)
-        column = columns(self.layout)
-        column.prop(settings, "turn", text="Along")
-        if settings.turn == 'FIXED':
-            column.prop(settings, "turn_direction")
-        elif settings.turn in {'TOWARDS', 'AROUND'}:
-            column.prop(settings, "turn_object")
-            if settings.turn_object is None:
-                column.prop(settings, "turn_point")
-        elif settings.turn == 'ATTRIBUTE':
-            column.prop(settings, "turn_attribute")
-        elif settings.turn == 'RANDOM':
-            column.prop(settings, "turn_seed")
-        draw_angle(column, settings, "angle")
+        draw_turn(columns(self.layout), settings)
 
 
 class BUBBLE_PATTERN_PT_feature_pull(FeaturePart, bpy.types.Panel):
@@ -145,7 +143,7 @@ class BUBBLE_PATTERN_PT_feature_facets(FeaturePart, bpy.types.Panel):
         settings = shown_settings(context)
         column = columns(self.layout)
         if settings.profile != 'MESH':
-            column.prop(settings, "sides", text="Sides (0 = Auto)")
+            column.prop(settings, "sides", text="Sides")
             column.prop(settings, "facet_tolerance", text="Tolerance")
         if settings.profile == 'CIRCLE':
             column.row().prop(settings, "across", expand=True)

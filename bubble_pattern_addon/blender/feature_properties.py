@@ -18,7 +18,8 @@ from bpy.props import (
 
 from ..core.feature_recipe import BUMP_HEIGHT, DIMPLE_DEPTH, RIM_SIZE
 from ..core.recipe import neat
-from .field_properties import SIZE, BubblePatternField, length_property
+from .field_properties import SIZE, BubblePatternField, angle_property, length_property
+from .packing_properties import stands_beside
 from .reacting import reshape_feature
 
 
@@ -52,22 +53,12 @@ def is_solid(settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
     return obj.type == 'MESH' and stands_beside(settings, obj)
 
 
-def stands_beside(settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
-    """Whether `obj` is no pattern, and neither the base nor the part of this one."""
-    return obj.bubble_pattern.base is None and obj not in (settings.base, settings.part)
-
-
 def vector_names(settings: Any, _context: bpy.types.Context, _text: str) -> list[str]:
     """Attributes of the base that are vectors."""
     base = settings.base
     if base is None:
         return []
     return [entry.name for entry in base.data.attributes if entry.data_type == 'FLOAT_VECTOR']
-
-
-def angle_property(name: str, description: str, **options: Any) -> Any:
-    """An angle, shown in degrees."""
-    return FloatProperty(name=name, description=description, subtype='ANGLE', precision=2, **options)
 
 
 class FeatureSettings:
@@ -134,10 +125,8 @@ class FeatureSettings:
         max=1.308996,
         update=reshape_feature,
     )
-    draft_text: StringProperty(
-        name="Draft Field",
-        description="Draft that varies over the region, as a field's table in TOML, in degrees",
-        update=reshape_feature,
+    draft_field: PointerProperty(
+        name="Draft Field", description="How the draft varies over the region", type=BubblePatternField
     )
     rim: EnumProperty(
         name="Rim",
@@ -315,10 +304,8 @@ class FeatureSettings:
     angle: angle_property(
         "Angle", "Turn added to that, counter-clockwise seen from outside", update=reshape_feature
     )
-    angle_text: StringProperty(
-        name="Angle Field",
-        description="Angle that varies over the region, as a field's table in TOML, in degrees",
-        update=reshape_feature,
+    angle_field: PointerProperty(
+        name="Angle Field", description="How the angle varies over the region", type=BubblePatternField
     )
     sides: IntProperty(
         name="Sides",

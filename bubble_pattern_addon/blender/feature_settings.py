@@ -12,11 +12,10 @@ import numpy as np
 
 from ..core.errors import RecipeError
 from ..core.feature_recipe import ASPECTS, ROUNDED, SIZES, Feature, Size
-from ..core.field_tables import field_to_toml
 from ..core.metric import Constant, Described
 from ..core.toml_values import Point
 from .field_properties import point_of, typed
-from .field_recipe import described, from_text, take
+from .field_recipe import described, in_degrees, take
 from .reading import transformed, world_frame
 
 # Keys that change the pattern's points, whatever their values.
@@ -40,7 +39,7 @@ def feature_of(settings: Any) -> Feature:
         kind=kind,
         depth=_depth(settings) if kind != "bump" else None,
         height=_height(settings) if kind == "bump" else None,
-        draft=_degrees(settings.draft, settings.draft_text, "draft") if walled else 0.0,
+        draft=_angle(settings, "draft") if walled else 0.0,
         rim=rim,
         rim_size=typed(settings.rim_size) or None if rim != "sharp" else None,
         rim_angle=in_degrees(settings.rim_angle) if rim == "chamfer" else 90.0,
@@ -51,7 +50,7 @@ def feature_of(settings: Any) -> Feature:
         rounding=typed(settings.rounding) if profile in ROUNDED else 0.0,
         sides=None if mesh else settings.sides or None,
         tolerance=None if mesh else typed(settings.facet_tolerance) or None,
-        angle=_degrees(settings.angle, settings.angle_text, "angle"),
+        angle=_angle(settings, "angle"),
     )
     if kind == "bump" and not mesh:
         feature = replace(feature, form=settings.form.lower())
@@ -102,11 +101,6 @@ def _turn_point(settings: Any) -> Point:
     return point_of(transformed(at[None], np.linalg.inv(world_frame(settings.base)))[0])
 
 
-def in_degrees(angle: float) -> float:
-    """The degrees that were typed, of the 32 bits that Blender keeps of their radians."""
-    return float(f"{math.degrees(angle):.6g}")
-
-
 def _plain(size: Described) -> Size:
     return size.value if isinstance(size, Constant) else size
 
@@ -115,19 +109,20 @@ def _depth(settings: Any) -> Size | None:
     if settings.kind == 'HOLE' and settings.depth_mode == 'THROUGH':
         return None
     constant = settings.depth if settings.kind == 'HOLE' else settings.dimple_depth
-    return _plain(described(settings.depth_field, constant, False, "[feature] depth")) or None
+    return _plain(described(settings.depth_field, constant, "size", "[feature] depth")) or None
 
 
 def _height(settings: Any) -> Size | None:
-    return _plain(described(settings.depth_field, settings.height, False, "[feature] height")) or None
+    return _plain(described(settings.depth_field, settings.height, "size", "[feature] height")) or None
 
 
 def _aspect(settings: Any) -> Size:
-    return _plain(described(settings.aspect_field, settings.aspect, True, "[feature] aspect"))
+    return _plain(described(settings.aspect_field, settings.aspect, "share", "[feature] aspect"))
 
 
-def _degrees(angle: float, text: str, key: str) -> Size:
-    return _plain(from_text(text, f"[feature] {key}")) if text else in_degrees(angle)
+def _angle(settings: Any, key: str) -> Size:
+    field, constant = getattr(settings, f"{key}_field"), getattr(settings, key)
+    return _plain(described(field, constant, "angle", f"[feature] {key}"))
 
 
 def take_feature(settings: Any, feature: Feature) -> None:
@@ -136,11 +131,8 @@ def take_feature(settings: Any, feature: Feature) -> None:
         setattr(settings, name, getattr(feature, name).upper())
     _take_depth(settings, feature)
     for name in ("draft", "angle"):
-        size = getattr(feature, name)
-        varies = isinstance(size, Described)
-        setattr(settings, f"{name}_text", field_to_toml(size) if varies else "")
-        setattr(settings, name, 0.0 if varies else math.radians(size))
-    _take_size(settings, "aspect", settings.aspect_field, feature.aspect, True)
+        _take_size(settings, name, getattr(settings, f"{name}_field"), getattr(feature, name), "angle")
+    _take_size(settings, "aspect", settings.aspect_field, feature.aspect, "share")
     if feature.aspect is None:
         settings.aspect = ASPECTS.get(feature.profile, 0.5)
     settings.rim_size = feature.rim_size or 0.0
@@ -166,16 +158,16 @@ def _take_depth(settings: Any, feature: Feature) -> None:
     size = feature.height if feature.kind == "bump" else feature.depth
     if size is None and feature.kind != "hole":
         size = 0.0
-    _take_size(settings, constants[feature.kind], settings.depth_field, size, False)
+    _take_size(settings, constants[feature.kind], settings.depth_field, size, "size")
 
 
-def _take_size(settings: Any, constant: str, field: Any, size: Size | None, share: bool) -> None:
+def _take_size(settings: Any, constant: str, field: Any, size: Size | None, unit: str) -> None:
     if isinstance(size, Described):
-        take(field, size, share)
+        take(field, size, unit)
         return
     field.kind = 'CONSTANT'
     if size is not None:
-        setattr(settings, constant, size)
+        setattr(settings, constant, math.radians(size) if unit == "angle" else size)
 
 
 def placing(feature: Feature) -> Feature:

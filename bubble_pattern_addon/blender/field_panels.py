@@ -19,9 +19,11 @@ SHOWN: Mapping[str, tuple[str, ...]] = {
 
 
 def draw_field(
-    column: bpy.types.UILayout, settings: Any, constant: str, group: str, share: bool, label: str
+    column: bpy.types.UILayout, settings: Any, constant: str, group: str, unit: str, label: str
 ) -> None:
-    """Draw the number `constant` of the settings, or where it varies, the field `group`."""
+    """Draw the number `constant` of the settings, or where it varies, the field `group`, whose values are in
+    `unit`: "size", "share" or "angle".
+    """
     field = getattr(settings, group)
     row = column.row(align=True)
     if field.kind == 'CONSTANT':
@@ -33,8 +35,8 @@ def draw_field(
     if field.kind == 'RECIPE':
         below.prop(field, "text", text=" ")
         return
-    below.prop(field, "start_share" if share else "start_size")
-    below.prop(field, "end_share" if share else "end_size")
+    below.prop(field, f"start_{unit}")
+    below.prop(field, f"end_{unit}")
     below = column.column()
     if field.kind == 'IMAGE':
         below.template_ID(field, "image", open="image.open")

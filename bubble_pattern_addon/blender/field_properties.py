@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import bpy
@@ -21,6 +22,8 @@ from ..core.toml_values import Point
 QUARTERS = (0.0, 0.25, 0.5, 0.75, 1.0)
 # What a kind starts with, relative to what the constant was: the second value, and how far it is to it.
 SECOND, WAY = {"pitch_field": 2.0, "diameter_field": 0.5, "depth_field": 2.0, "aspect_field": 0.5}, 5.0
+# An angle is not multiplied, for it may be 0: so much is added to it.
+MORE = {"draft_field": math.radians(3.0), "angle_field": math.radians(90.0)}
 
 
 def length_property(name: str, description: str, default: float = 0.0, **options: Any) -> Any:
@@ -34,6 +37,11 @@ def length_property(name: str, description: str, default: float = 0.0, **options
         precision=4,
         **options,
     )
+
+
+def angle_property(name: str, description: str, **options: Any) -> Any:
+    """An angle, shown in degrees."""
+    return FloatProperty(name=name, description=description, subtype='ANGLE', precision=2, **options)
 
 
 # A length that something stands for cannot be nothing.
@@ -65,15 +73,24 @@ def kind_changed(field: Any, context: bpy.types.Context) -> None:
     which = field.path_from_id().rpartition(".")[2]
     if field.kind not in {'CONSTANT', 'RECIPE'} and not field.begun and settings.live:
         settings.live = False
-        sizes = {"pitch_field": settings.pitch, "depth_field": settings.diameter / 4}
-        size = sizes.get(which, settings.diameter)
-        share = settings.aspect if which == "aspect_field" else settings.fill
-        field.start_size, field.end_size = size, SECOND[which] * size
-        field.start_share, field.end_share = share, SECOND[which] * share
+        if which in MORE:
+            angle = getattr(settings, which.removesuffix("_field"))
+            field.start_angle, field.end_angle = angle, angle + MORE[which]
+        else:
+            begin_sizes(field, settings, which)
         field.distance = WAY * settings.pitch
         field.begun = True
         settings.live = True
     changed(field, context)
+
+
+def begin_sizes(field: Any, settings: Any, which: str) -> None:
+    """Let the values of the field `which`, a size or a share, start from the constant."""
+    sizes = {"pitch_field": settings.pitch, "depth_field": settings.diameter / 4}
+    size = sizes.get(which, settings.diameter)
+    share = settings.aspect if which == "aspect_field" else settings.fill
+    field.start_size, field.end_size = size, SECOND[which] * size
+    field.start_share, field.end_share = share, SECOND[which] * share
 
 
 def attribute_names(field: Any, _context: bpy.types.Context, _text: str) -> list[str]:
@@ -122,8 +139,8 @@ class BubblePatternField(bpy.types.PropertyGroup):
             ('CONSTANT', "Constant", "The same everywhere", 'REMOVE', 0),
             ('LINEAR', "Linear", "From one value to another along a direction", 'ARROW_LEFTRIGHT', 1),
             ('RADIAL', "Radial", "By the distance from a point or an axis", 'PROP_CON', 2),
-            ('EDGE', "Edge Distance", "By the distance from the boundary of the region", 'MOD_OUTLINE', 3),
-            ('DISTANCE', "Object Distance", "By the distance from other objects", 'DRIVER_DISTANCE', 4),
+            ('EDGE', "From Edge", "By the distance from the boundary of the region", 'MOD_OUTLINE', 3),
+            ('DISTANCE', "From Objects", "By the distance from other objects", 'DRIVER_DISTANCE', 4),
             ('ATTRIBUTE', "Attribute", "By a vertex group or an attribute", 'BRUSH_DATA', 5),
             ('IMAGE', "Image", "By the brightness of an image", 'IMAGE_DATA', 6),
             ('RECIPE', "From Recipe", "As a recipe describes it", 'TEXT', 7),
@@ -142,6 +159,8 @@ class BubblePatternField(bpy.types.PropertyGroup):
         name="To", description="Share of the pitch at the end", subtype='FACTOR', default=0.3,
         min=0.01, max=0.99, update=changed,
     )  # fmt: skip
+    start_angle: angle_property("From", "Angle at the start", update=changed)
+    end_angle: angle_property("To", "Angle at the end", update=changed)
     falloff: EnumProperty(
         name="Falloff",
         description="How the value goes from the start to the end",
@@ -287,4 +306,6 @@ class BubblePatternField(bpy.types.PropertyGroup):
     width: length_property(
         "Width", "Width of the image on the region, or 0 to cover it", min=0.0, update=changed
     )
-    text: StringProperty(name="Recipe", description="The field as a table in TOML, in meters", update=changed)
+    text: StringProperty(
+        name="Recipe", description="The field as a table in TOML, in meters and degrees", update=changed
+    )

@@ -26,26 +26,35 @@ SINGLE = 1e-6
 # -- to the recipe -------------------------------------------------------------------------------------------
 
 
-def described(field: Any, constant: float, share: bool, where: str) -> Described:
+def described(field: Any, constant: float, unit: str, where: str) -> Described:
     """The field that the properties stand for; `constant` is the number beside them.
 
-    share: its values are shares of the pitch. Raises RecipeError, which names the key by `where`, where
-    something is not chosen yet or a recipe's text makes no sense.
+    unit: of its values, "size", "share" (of the pitch or of another size) or "angle", in the recipe in
+    degrees. Raises RecipeError, which names the key by `where`, where something is not chosen yet or a
+    recipe's text makes no sense.
     """
     if field.kind == 'CONSTANT':
-        return Constant(typed(constant))
+        return Constant(VALUE[unit](constant))
     if field.kind == 'RECIPE':
         return from_text(field.text, where)
-    ends = (field.start_share, field.end_share) if share else (field.start_size, field.end_size)
     graded = {
-        "from_": typed(ends[0]),
-        "to": typed(ends[1]),
+        "from_": VALUE[unit](getattr(field, f"start_{unit}")),
+        "to": VALUE[unit](getattr(field, f"end_{unit}")),
         "falloff": field.falloff.lower(),
         "curve": curve_of(field) if field.falloff == 'CURVE' else (),
         "invert": field.invert,
         "clamp": field.clamp or field.falloff != 'LINEAR',
     }
     return DESCRIBED[field.kind](field, graded, where)
+
+
+def in_degrees(angle: float) -> float:
+    """The degrees that were typed, of the 32 bits that Blender keeps of their radians."""
+    return float(f"{math.degrees(angle):.6g}")
+
+
+# The recipe's number for a property's, by the unit of a field.
+VALUE: Mapping[str, Callable[[float], float]] = {"size": typed, "share": typed, "angle": in_degrees}
 
 
 def from_text(text: str, where: str) -> Described:
@@ -160,16 +169,16 @@ KIND_OF = {
 # -- from the recipe -----------------------------------------------------------------------------------------
 
 
-def take(field: Any, wanted: Described, share: bool) -> None:
+def take(field: Any, wanted: Described, unit: str) -> None:
     """Set the properties to a field that is not constant; what they cannot show is kept as text."""
     field.begun = True
     kind = KIND_OF.get(type(wanted))
     if kind is not None:
-        for name, value in _shown(wanted, share):
+        for name, value in _shown(wanted, unit):
             setattr(field, name, value)
         field.kind = kind
         try:
-            if same(described(field, 0.0, share, ""), wanted):
+            if same(described(field, 0.0, unit, ""), wanted):
                 return
         except RecipeError:
             pass  # an object or an image that is not there
@@ -177,12 +186,13 @@ def take(field: Any, wanted: Described, share: bool) -> None:
     field.kind = 'RECIPE'
 
 
-def _shown(wanted: Described, share: bool) -> Iterator[tuple[str, Any]]:
+def _shown(wanted: Described, unit: str) -> Iterator[tuple[str, Any]]:
     """Properties with values that show as much of a field as they can."""
-    ends = ("start_share", "end_share") if share else ("start_size", "end_size")
-    renamed = {"from_": ends[0], "to": ends[1], "name": "attribute"}
+    renamed = {"from_": f"start_{unit}", "to": f"end_{unit}", "name": "attribute"}
     for entry in fields(wanted):  # type: ignore[arg-type]
-        yield from _property(renamed.get(entry.name, entry.name), getattr(wanted, entry.name))
+        value = getattr(wanted, entry.name)
+        turns = unit == "angle" and entry.name in ("from_", "to")
+        yield from _property(renamed.get(entry.name, entry.name), math.radians(value) if turns else value)
     if isinstance(wanted, Linear):
         yield "along", 'POINTS' if wanted.direction is None else 'DIRECTION'
         yield "start_object", None

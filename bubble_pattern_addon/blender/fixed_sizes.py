@@ -18,6 +18,7 @@ from ..core.progress import drive
 from .attributes import read_values
 from .edit_undo import take_all_back
 from .field_properties import length_property, point_of, typed
+from .hand_state import check_settled
 from .operators import OnPattern, current_pattern, poll_pattern, refused
 from .properties import is_pattern
 from .settings_recipe import spoken
@@ -34,6 +35,7 @@ class SizesOperator:
             bpy.ops.object.mode_set(mode='OBJECT')
         before = [(point_of(seed.at), seed.diameter) for seed in obj.bubble_pattern.seeds]
         try:
+            check_settled(obj)
             self.change(obj, context, editing)
             shape(obj, context)
         except PatternError as error:

@@ -25,6 +25,7 @@ from ..core.results import Results, results_of
 from ..core.shaping import reshaped
 from . import live
 from .cut_preview import hide_cut
+from .hand_state import by_hand, is_kept
 from .noting import note_quality, note_results, noted_quality
 from .pattern_object import read_pattern, write_pattern, write_sizes
 from .preview_nodes import show_preview
@@ -132,7 +133,7 @@ def update_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[Non
 def renewing_steps(obj: bpy.types.Object, context: bpy.types.Context) -> Steps[None]:
     """Bring the pattern up to date by itself. Raises PatternError where hand work would be lost by it."""
     settings = obj.bubble_pattern
-    if not settings.hand_made:
+    if not is_kept(obj):
         yield from update_steps(obj, context)
     elif is_only_shape(settings):
         reshape(obj, context)
@@ -147,8 +148,8 @@ def react(settings: Any, context: bpy.types.Context, repack: bool) -> None:
         hide_cut(settings.base)
     if not answers(settings, context) or live.is_taken_up(obj):
         return
-    if settings.hand_made and (repack or not is_only_shape(settings)):
-        return  # hand work is not thrown away without being asked
+    if is_kept(obj) and (by_hand(obj).unsettled or repack or not is_only_shape(settings)):
+        return  # hand work is not thrown away without being asked; the sidebar says so
     try:
         if not repack and is_only_shape(settings):
             reshape(obj, context)
@@ -186,7 +187,7 @@ def reshape(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     recipe = recipe_of(settings)
     source = read_source(settings.base, settings.region, context, recipe)
     if source.fingerprint != settings.fingerprint:
-        if settings.hand_made:
+        if is_kept(obj):
             raise PatternError(HAND_MADE.format("base"))
         drive(update_steps(obj, context))
         return

@@ -18,6 +18,7 @@ from ..core.mesh import Bools
 from ..core.progress import drive
 from .attributes import read_values, write_values
 from .edit_undo import take_all_back
+from .hand_state import MOVED, by_hand_now
 from .operators import current_pattern, poll_pattern, refused
 from .point_marks import PINNED, keep_pins, laid_places, pinned_points
 from .properties import is_pattern
@@ -26,9 +27,6 @@ from .settings_recipe import is_outdated, recipe_of, recipe_text, spoken
 if TYPE_CHECKING:
     from ..core.pattern import Pattern
     from ..core.settling import HandWork
-
-# A point farther than this from where it was laid, in pitches, has been moved.
-MOVED = 1e-3
 
 
 def read_hand_work(obj: bpy.types.Object, before: Pattern) -> HandWork:
@@ -64,11 +62,16 @@ class OnPoints:
 
     bl_options = {'REGISTER', 'UNDO'}
     needs_selection = True
+    # Whether it works in Object Mode as well, on what was done in Edit Mode before.
+    works_outside = False
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if not poll_pattern(cls, context):
             return False
+        if cls.works_outside and context.mode == 'OBJECT':
+            found = by_hand_now(current_pattern(context))
+            return any(found) or refused(cls, "Go to Edit Mode of the pattern and move features first")
         if context.mode != 'EDIT_MESH' or not is_pattern(context.active_object):
             return refused(cls, "Go to Edit Mode of the pattern first")
         if cls.needs_selection and not context.active_object.data.total_vert_sel:
@@ -78,15 +81,19 @@ class OnPoints:
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Do the work in Object Mode; an error leaves everything as it was."""
         obj = current_pattern(context)
-        bpy.ops.object.mode_set(mode='OBJECT')
+        editing = obj.mode == 'EDIT'
+        if editing:
+            bpy.ops.object.mode_set(mode='OBJECT')
         try:
             self.work(obj, context)
         except PatternError as error:
             self.report({'ERROR'}, spoken(error, context))  # type: ignore[attr-defined]
             return {'CANCELLED'}
         finally:
-            bpy.ops.object.mode_set(mode='EDIT')
-        take_all_back()
+            if editing:
+                bpy.ops.object.mode_set(mode='EDIT')
+        if editing:
+            take_all_back()
         return {'FINISHED'}
 
     def work(self, obj: bpy.types.Object, context: bpy.types.Context) -> None:
@@ -138,6 +145,7 @@ class BUBBLE_PATTERN_OT_settle(OnPoints, bpy.types.Operator):
     bl_idname = "bubble_pattern.settle"
     bl_label = "Settle"
     needs_selection = False
+    works_outside = True
 
     fill_voids: BoolProperty(
         name="Fill Voids",

@@ -21,6 +21,7 @@ from ..core.errors import PatternError
 from ..core.progress import Steps
 from . import runs, watching
 from .cut_preview import cut_modifiers
+from .hand_state import is_kept
 from .keep_out_properties import keep_out_objects
 from .properties import in_scene, is_pattern, pattern_of
 from .settings_recipe import is_outdated, recipe_of, spoken
@@ -113,8 +114,8 @@ def lay_waiting() -> None:
         if obj is None or obj.session_uid not in waiting or 'EDIT' in active.mode:
             continue
         with inside(window):
-            if bpy.ops.bubble_pattern.update.poll():
-                bpy.ops.bubble_pattern.update('INVOKE_DEFAULT', follows=True)
+            if bpy.ops.bubble_pattern.follow.poll() and not is_kept(obj):
+                bpy.ops.bubble_pattern.follow('INVOKE_DEFAULT')
         return
 
 
@@ -177,7 +178,7 @@ def can_be_looked_at(base: bpy.types.Object) -> bool:
 def is_behind(obj: bpy.types.Object) -> bool:
     """Whether the settings want another pattern than stands there, one that would not take long."""
     settings = obj.bubble_pattern
-    quick = settings.seconds <= PATIENCE and not settings.hand_made
+    quick = settings.seconds <= PATIENCE and not is_kept(obj)
     return is_outdated(settings) and not settings.trouble and quick
 
 

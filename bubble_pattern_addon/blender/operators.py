@@ -11,13 +11,14 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, FloatProperty
 
-from ..core.errors import PatternError
 from ..core.feature_recipe import nouns
 from ..core.progress import Progress, Steps
 from .cut_preview import hide_cut
 from .field_properties import length_property, typed
+from .hand_state import by_hand_now
+from .laying import AnewOperator, LayingOperator
 from .properties import in_scene, is_pattern, pattern_objects, pattern_of
-from .settings_recipe import recipe_of, spoken
+from .settings_recipe import recipe_of
 from .stepping import SteppedOperator
 from .target_region import free_name, selected_faces, store, stored, trying_region, wanted_faces
 
@@ -67,39 +68,6 @@ class OnPattern:
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return poll_pattern(cls, context) and poll_object_mode(cls, context)
-
-
-class AnewOperator(SteppedOperator):
-    """Mixin for an operator that lays the current pattern anew: it asks before hand work is thrown away."""
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Ask where there is something to lose, or work at once."""
-        if not current_pattern(context).bubble_pattern.hand_made:
-            return super().invoke(context, event)
-        return context.window_manager.invoke_confirm(  # type: ignore[no-any-return]
-            self,
-            event,
-            title="Lay the pattern anew?",
-            message="It was settled by hand. Only pinned features will stay where they are.",
-            confirm_text="Lay Anew",
-            icon='WARNING',
-        )
-
-
-class LayingOperator(SteppedOperator):
-    """Mixin for an operator that lays a pattern: its steps end with the pattern's object."""
-
-    def settles_on(self, context: bpy.types.Context) -> bpy.types.Object | None:
-        obj = pattern_of(context.active_object)
-        return context.active_object if obj is None else obj.bubble_pattern.base
-
-    def done(self, context: bpy.types.Context, result: bpy.types.Object) -> None:
-        """Say how many features there are."""
-        count = result.bubble_pattern.count
-        if count == 0:
-            self.report({'WARNING'}, "No feature fits in the region: make the pitch smaller")
-        else:
-            self.report({'INFO'}, f"{count:,} feature{'s' if count > 1 else ''}")
 
 
 class BUBBLE_PATTERN_OT_add(LayingOperator, bpy.types.Operator):
@@ -190,24 +158,9 @@ class BUBBLE_PATTERN_OT_update(OnPattern, AnewOperator, LayingOperator, bpy.type
     bl_options = {'REGISTER', 'UNDO'}
     heeds_sidebar = True
 
-    follows: BoolProperty(
-        name="Follow",
-        description="A setting has changed; what is wrong with it stands in the sidebar",
-        options={'HIDDEN', 'SKIP_SAVE'},
-    )
-
     def about(self, context: bpy.types.Context) -> int:
         number: int = current_pattern(context).session_uid
         return number
-
-    def may_be_dragged(self) -> bool:
-        return self.follows
-
-    def refuse(self, error: PatternError, context: bpy.types.Context) -> set[str]:
-        if not self.follows:
-            return super().refuse(error, context)
-        current_pattern(context).bubble_pattern.trouble = spoken(error, context)
-        return {'CANCELLED'}
 
     def steps(self, context: bpy.types.Context) -> Steps[bpy.types.Object]:
         from . import generation
@@ -223,6 +176,15 @@ class BUBBLE_PATTERN_OT_apply(OnPattern, SteppedOperator, bpy.types.Operator):
     bl_idname = "bubble_pattern.apply"
     bl_label = "Apply"
     bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not super().poll(context):
+            return False
+        placed = by_hand_now(current_pattern(context))
+        return not placed.unsettled or refused(
+            cls, f"Settle the features that were placed by hand first ({placed}), or press Update"
+        )
 
     def steps(self, context: bpy.types.Context) -> Steps[Any]:
         from . import applying
@@ -308,7 +270,7 @@ def remove_object(obj: bpy.types.Object) -> None:
         bpy.data.meshes.remove(mesh)
 
 
-class BUBBLE_PATTERN_OT_region_assign(LayingOperator, bpy.types.Operator):
+class BUBBLE_PATTERN_OT_region_assign(AnewOperator, LayingOperator, bpy.types.Operator):
     """Let the selected faces be the target region of the pattern"""
 
     bl_idname = "bubble_pattern.region_assign"

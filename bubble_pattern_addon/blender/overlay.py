@@ -16,6 +16,7 @@ from bpy.app.handlers import persistent
 from mathutils import Vector
 
 from ..core.mesh import Floats
+from . import handling
 
 CORNERS = 32
 # How far marks stand over the surface, and how long the ticks at the web's ends are, relative to a diameter.
@@ -238,12 +239,10 @@ HANDLERS = (
 
 def register() -> None:
     """Look out for other files, and for wishes that an undo takes back."""
-    for name, handler in HANDLERS:
-        getattr(bpy.app.handlers, name).append(handler)
+    handling.add(HANDLERS)
 
 
 def unregister() -> None:
     """Leave nothing behind."""
-    for name, handler in HANDLERS:
-        getattr(bpy.app.handlers, name).remove(handler)
+    handling.remove(HANDLERS)
     remove()

@@ -17,7 +17,7 @@ class BUBBLE_PATTERN_PT_packing(SettingsPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         settings = shown_settings(context)
         column = columns(self.layout)
-        draw_field(column, settings, "pitch", "pitch_field", False, "Pitch")
+        draw_field(column, settings, "pitch", "pitch_field", "size", "Pitch")
         column.prop(settings, "edge_offset")
         column.prop(settings, "orientation")
         if settings.orientation == 'GIVEN':
@@ -36,7 +36,7 @@ def draw_hand_work(
     if settings.pins:
         layout.label(text=f"{len(settings.pins):,} pinned", icon='PINNED')
     if settings.hand_made:
-        words = "Settled by hand: Update keeps only pinned features"
+        words = "Settled by hand: Update would keep only pinned features"
         sentences(layout, words, context.region.width, 'INFO')
 
 
@@ -46,10 +46,16 @@ def draw_symmetry(column: bpy.types.UILayout, settings: bpy.types.PropertyGroup)
     if settings.symmetry == 'ROTATE':
         column.prop(settings, "symmetry_fold")
         column.prop(settings, "symmetry_axis")
-    if settings.symmetry != 'OFF':
-        column.prop(settings, "use_symmetry_centre")
-    if settings.symmetry != 'OFF' and settings.use_symmetry_centre:
+    if settings.symmetry == 'OFF':
+        return
+    column.prop(settings, "use_symmetry_centre")
+    if settings.use_symmetry_centre:
         column.prop(settings, "symmetry_centre", text=" ")
+    column.prop(settings, "use_symmetry_axes")
+    if settings.use_symmetry_axes:
+        column.prop(settings, "symmetry_object")
+        if settings.symmetry_object is None:
+            column.prop(settings, "symmetry_rotation")
 
 
 class BUBBLE_PATTERN_PT_solver(SettingsPanel, bpy.types.Panel):

@@ -28,6 +28,11 @@ class BubblePatternPin(bpy.types.PropertyGroup):
     )
 
 
+def stands_beside(settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
+    """Whether `obj` is no pattern, and neither the base nor the part of this one."""
+    return obj.bubble_pattern.base is None and obj not in (settings.base, settings.part)
+
+
 class PackingSettings:
     """Where the features are, as the recipe's [packing]."""
 
@@ -114,6 +119,26 @@ class PackingSettings:
         description="Point of the mirror planes or of the axis, in the coordinates of the base",
         size=3,
         subtype='TRANSLATION',
+        update=repack,
+    )
+    use_symmetry_axes: BoolProperty(
+        name="Own Axes",
+        description="Let the symmetry go by other axes than those of the base, as where it stands askew",
+        default=False,
+        update=repack,
+    )
+    symmetry_object: PointerProperty(
+        name="Axes Of",
+        description="Object, such as an empty, whose axes the symmetry goes by",
+        type=bpy.types.Object,
+        poll=stands_beside,
+        update=repack,
+    )
+    symmetry_rotation: FloatVectorProperty(
+        name="Rotation",
+        description="How the axes of the symmetry are turned against those of the base",
+        size=3,
+        subtype='EULER',
         update=repack,
     )
     integrator: EnumProperty(

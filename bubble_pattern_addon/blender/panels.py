@@ -17,6 +17,7 @@ from . import (
     runs,
     shaping_panel,
 )
+from .hand_state import ByHand, by_hand_now
 from .presets import BUBBLE_PATTERN_PT_presets
 from .properties import in_scene, is_pattern, pattern_objects, pattern_of
 from .recipe_operators import draw_files
@@ -83,6 +84,10 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
             self.draw_points(layout, settings)
             return
         editing = context.mode == 'EDIT_MESH'
+        placed = by_hand_now(obj)
+        if placed.unsettled:
+            self.draw_placed(context, layout, settings, placed)
+            return
         row = (large(layout) if editing else layout).row(align=True)
         if editing:
             row.operator("bubble_pattern.region_assign", text="Assign Region", icon='CHECKMARK')
@@ -94,11 +99,26 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
                 row.operator("bubble_pattern.update", icon='FILE_REFRESH')
         if trouble:
             sentences(layout, trouble, context.region.width, 'ERROR')
+        if outdated and (settings.hand_made or any(placed)):
+            sentences(layout, paused(settings, placed), context.region.width, 'PAUSE')
         if outdated:
             large(layout).operator("bubble_pattern.update", icon='FILE_REFRESH', depress=True)
         (layout.row() if outdated or editing else large(layout)).operator(
             "bubble_pattern.apply", icon='CHECKMARK'
         )
+        layout.operator("bubble_pattern.remove", icon='TRASH')
+
+    def draw_placed(
+        self, context: bpy.types.Context, layout: bpy.types.UILayout, settings: Any, placed: ByHand
+    ) -> None:
+        """Features were moved or added by hand: they are settled next, or laid anew."""
+        text = f"Placed by hand: {placed}. Settle takes the features as they are; till then live update waits"
+        sentences(layout, text, context.region.width, 'PAUSE')
+        large(layout).operator("bubble_pattern.settle", icon='MOD_SMOOTH')
+        layout.operator("bubble_pattern.edit_sizes", text="Edit Points", icon='EDITMODE_HLT')
+        row = layout.row(align=True)
+        row.operator("bubble_pattern.update", icon='FILE_REFRESH')
+        row.operator("bubble_pattern.apply", icon='CHECKMARK')
         layout.operator("bubble_pattern.remove", icon='TRASH')
 
     def draw_points(self, layout: bpy.types.UILayout, settings: Any) -> None:
@@ -128,6 +148,13 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
         large(layout).operator("bubble_pattern.edit", icon='GREASEPENCIL')
         draw_files(layout)
         layout.operator("bubble_pattern.remove", icon='TRASH')
+
+
+def paused(settings: Any, placed: ByHand) -> str:
+    """Why the pattern does not follow its settings: what was done by hand is not thrown away unasked."""
+    what = "settled by hand" if settings.hand_made else f"changed by hand ({placed})"
+    waits = "Live update waits: the" if settings.live else "The"
+    return f"{waits} features were {what}. Update lays them anew; only pinned ones stay"
 
 
 # in the order of work, which is also the order in which they are drawn

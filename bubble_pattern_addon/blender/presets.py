@@ -16,7 +16,8 @@ from bpy.props import StringProperty
 
 from ..core.errors import PatternError
 from ..core.progress import Steps
-from .operators import LayingOperator, OnPattern, current_pattern
+from .laying import AnewOperator, LayingOperator
+from .operators import OnPattern, current_pattern
 from .settings_recipe import spoken
 
 SUBDIR = "bubble_pattern"
@@ -48,12 +49,13 @@ def is_shipped(path: str) -> bool:
     return Path(path).is_relative_to(SHIPPED)
 
 
-class BUBBLE_PATTERN_OT_preset_load(OnPattern, LayingOperator, bpy.types.Operator):
+class BUBBLE_PATTERN_OT_preset_load(OnPattern, AnewOperator, LayingOperator, bpy.types.Operator):
     """Lay the pattern by this preset"""
 
     bl_idname = "bubble_pattern.preset_load"
     bl_label = "Load Preset"
     bl_options = {'REGISTER', 'UNDO'}
+    keeps_sizes = False
 
     filepath: StringProperty(subtype='FILE_PATH', options={'SKIP_SAVE'})
 

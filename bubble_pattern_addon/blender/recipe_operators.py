@@ -12,8 +12,10 @@ from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ..core.errors import PatternError, RecipeError
 from ..core.progress import Steps
-from .operators import LayingOperator, OnPattern, current_pattern
+from .laying import AnewOperator, LayingOperator
+from .operators import OnPattern, current_pattern
 from .settings_recipe import spoken
+from .sidebar import sentences
 
 # What was copied where there is no clipboard, as in Blender without a window.
 _held: list[str] = []
@@ -56,12 +58,13 @@ class BUBBLE_PATTERN_OT_recipe_copy(OnPattern, bpy.types.Operator):
         return {'FINISHED'}
 
 
-class BUBBLE_PATTERN_OT_recipe_paste(OnPattern, LayingOperator, bpy.types.Operator):
+class BUBBLE_PATTERN_OT_recipe_paste(OnPattern, AnewOperator, LayingOperator, bpy.types.Operator):
     """Lay the pattern by the recipe in the clipboard, on the faces that it has"""
 
     bl_idname = "bubble_pattern.recipe_paste"
     bl_label = "Paste Recipe"
     bl_options = {'REGISTER', 'UNDO'}
+    keeps_pins = keeps_sizes = False
 
     def steps(self, context: bpy.types.Context) -> Steps[bpy.types.Object]:
         from .recipe_exchange import adopt_steps, tables_of
@@ -96,19 +99,30 @@ class BUBBLE_PATTERN_OT_recipe_save(OnPattern, bpy.types.Operator, ExportHelper)
         return {'FINISHED'}
 
 
-class BUBBLE_PATTERN_OT_recipe_load(OnPattern, LayingOperator, bpy.types.Operator, ImportHelper):
+class BUBBLE_PATTERN_OT_recipe_load(
+    OnPattern, AnewOperator, LayingOperator, bpy.types.Operator, ImportHelper
+):
     """Lay the pattern by a recipe file, on the faces that it has"""
 
     bl_idname = "bubble_pattern.recipe_load"
     bl_label = "Load Recipe"
     bl_options = {'REGISTER', 'UNDO'}
     filename_ext = ".toml"
+    keeps_pins = keeps_sizes = False
 
     filter_glob: StringProperty(default="*.toml", options={'HIDDEN'})
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Ask for the file."""
+        self._lost = self.lost(context)
         return ImportHelper.invoke(self, context, event)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Beside the files: what will be lost."""
+        lost = getattr(self, "_lost", "")
+        if lost:
+            text = f"Lost will be what was done by hand: {lost}"
+            sentences(self.layout, text, context.region.width, 'WARNING')
 
     def steps(self, context: bpy.types.Context) -> Steps[bpy.types.Object]:
         from .recipe_exchange import adopt_steps, tables_in

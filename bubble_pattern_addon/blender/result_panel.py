@@ -15,6 +15,8 @@ from .sidebar import SettingsPanel, columns, sentences, shown_settings
 
 # More nominal sizes than this are only counted.
 MOST_ROWS = 10
+# A place as far as this from every feature, in pitches, has room for another one.
+ROOM = 1.0
 
 
 class Figure(NamedTuple):
@@ -51,7 +53,7 @@ class BUBBLE_PATTERN_PT_result(SettingsPanel, bpy.types.Panel):
         layout = self.layout
         layout.active = not is_outdated(settings)
         draw_table(layout, [*size_figures(context, settings), *removed_figures(context, settings)])
-        draw_table(layout, quality_figures(settings))
+        draw_table(layout, quality_figures(settings), 0.43)
         for one in settings.broken:
             draw_broken(context, layout, one)
         row = layout.row(align=True)
@@ -59,23 +61,30 @@ class BUBBLE_PATTERN_PT_result(SettingsPanel, bpy.types.Panel):
         if settings.web_ids[0] >= 0:
             go = row.operator("bubble_pattern.select_offending", text="", icon='VIEWZOOM')
             go.rule = 'SMALLEST_WEB'
-        columns(layout).prop(settings, "density", text="Density (g/cm³)")
+        draw_density(layout, settings)
         draw_files(layout)
         if settings.notes:
             sentences(layout, settings.notes, context.region.width, 'INFO')
 
 
-def draw_table(layout: bpy.types.UILayout, figures: list[Figure]) -> None:
-    """Names on the left, figures on the right."""
+def draw_table(layout: bpy.types.UILayout, figures: list[Figure], names: float = 0.5) -> None:
+    """Names on the left, which take the share `names` of the width, figures on the right."""
     table = layout.column(align=True)
     for name, text, alert in figures:
-        split = table.split(factor=0.5)
+        split = table.split(factor=names)
         left = split.row()
         left.alignment = 'RIGHT'
         left.label(text=name)
         right = split.row()
         right.alert = alert
         right.label(text=text)
+
+
+def draw_density(layout: bpy.types.UILayout, settings: Any) -> None:
+    """The density, with its unit, which Blender has none for."""
+    row = columns(layout).row(align=True)
+    row.prop(settings, "density")
+    row.label(text="g/cm³")
 
 
 def size_figures(context: bpy.types.Context, settings: Any) -> list[Figure]:
@@ -146,16 +155,19 @@ def mass_text(context: bpy.types.Context, grams: float) -> str:
 def quality_figures(settings: Any) -> list[Figure]:
     """How good the packing is, in words, with the figure behind each word."""
     behind = {
-        "order": f"{settings.six:.0%} six",
+        "order": f"{settings.six:.0%}",
         "gaps": f"±{settings.gap_cv:.1%}",
         "smallest_gap": f"{settings.gap_min:.2f}",
         "first_row": f"±{settings.rim_cv:.1%}",
     }
     entries = [entry.split(",") for entry in settings.words.split(";") if entry]
-    return [
+    figures = [
         Figure(name.replace("_", " ").title(), f"{word.title()} ({behind[name]})", word == "poor")
         for name, word in entries
     ]
+    if settings.void >= 0:
+        figures.append(Figure("Widest Void", f"{settings.void:.2f} pitches", settings.void >= ROOM))
+    return figures
 
 
 def draw_broken(context: bpy.types.Context, layout: bpy.types.UILayout, one: Any) -> None:

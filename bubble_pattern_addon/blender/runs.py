@@ -9,10 +9,10 @@ from __future__ import annotations
 import time
 from typing import Any
 
-import bpy
 from bpy.app.handlers import persistent
 
 from ..core.progress import Progress, Steps
+from . import handling
 
 
 class Run:
@@ -83,17 +83,15 @@ def stop_before(*_: Any) -> None:
     stop()
 
 
-HANDLERS = ("undo_pre", "redo_pre", "load_pre", "save_pre")
+HANDLERS = tuple((name, stop_before) for name in ("undo_pre", "redo_pre", "load_pre", "save_pre"))
 
 
 def register() -> None:
     """Have runs end before the data change."""
-    for name in HANDLERS:
-        getattr(bpy.app.handlers, name).append(stop_before)
+    handling.add(HANDLERS)
 
 
 def unregister() -> None:
     """End the run under way."""
     stop()
-    for name in HANDLERS:
-        getattr(bpy.app.handlers, name).remove(stop_before)
+    handling.remove(HANDLERS)

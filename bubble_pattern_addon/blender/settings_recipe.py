@@ -21,6 +21,7 @@ from .field_recipe import described, take
 from .keep_out_properties import is_given, keep_out_of, take_keep_out
 from .making_recipe import limits_of, output_of, shaping_output, sizes_of, take_limits, take_sizes
 from .properties import BubblePatternSettings
+from .symmetry_settings import symmetry_axes, symmetry_centre, symmetry_word, take_symmetry
 
 
 def recipe_of(settings: Any) -> Recipe:
@@ -33,7 +34,7 @@ def recipe_of(settings: Any) -> Recipe:
             keep_out=tuple(keep_out_of(entry) for entry in settings.keep_out if is_given(entry)),
         ),
         packing=Packing(
-            pitch=described(settings.pitch_field, settings.pitch, False, "[packing] pitch"),
+            pitch=described(settings.pitch_field, settings.pitch, "size", "[packing] pitch"),
             edge_offset=typed(settings.edge_offset),
             orientation=(
                 point_of(settings.rows_along)
@@ -41,7 +42,8 @@ def recipe_of(settings: Any) -> Recipe:
                 else settings.orientation.lower()
             ),
             symmetry=symmetry_word(settings),
-            symmetry_centre=point_of(settings.symmetry_centre) if settings.use_symmetry_centre else None,
+            symmetry_centre=symmetry_centre(settings),
+            symmetry_axes=symmetry_axes(settings),
             integrator=settings.integrator.lower(),
             seed=settings.seed,
             iterations=settings.iterations,
@@ -68,8 +70,8 @@ def recipe_of(settings: Any) -> Recipe:
 def diameter_of(settings: Any) -> Described:
     """The shaping metric: a size, or a share of the pitch."""
     if settings.diameter_mode == 'SHARE':
-        return Fill(described(settings.diameter_field, settings.fill, True, "[shaping] fill"))
-    return described(settings.diameter_field, settings.diameter, False, "[shaping] diameter")
+        return Fill(described(settings.diameter_field, settings.fill, "share", "[shaping] fill"))
+    return described(settings.diameter_field, settings.diameter, "size", "[shaping] diameter")
 
 
 def take_recipe(settings: Any, recipe: Recipe) -> None:
@@ -88,33 +90,13 @@ def take_recipe(settings: Any, recipe: Recipe) -> None:
     settings.live = live
 
 
-def symmetry_word(settings: Any) -> str:
-    """The recipe's word for the symmetry of the settings."""
-    if settings.symmetry != 'ROTATE':
-        return settings.symmetry.lower()
-    axis = "" if settings.symmetry_axis == 'REGION' else f" {settings.symmetry_axis.lower()}"
-    return f"rotate {settings.symmetry_fold}{axis}"
-
-
-def take_symmetry(settings: Any, packing: Packing) -> None:
-    """Set the settings of symmetry."""
-    kind, *turn = packing.symmetry.split()
-    settings.symmetry = kind.upper()
-    if turn:
-        settings.symmetry_fold = int(turn[0])
-        settings.symmetry_axis = turn[1].upper() if len(turn) > 1 else 'REGION'
-    settings.use_symmetry_centre = packing.symmetry_centre is not None
-    if packing.symmetry_centre is not None:
-        settings.symmetry_centre = packing.symmetry_centre
-
-
 def take_packing(settings: Any, packing: Packing) -> None:
     """Set the settings of step 1."""
     if isinstance(packing.pitch, Constant):
         settings.pitch_field.kind = 'CONSTANT'
         settings.pitch = packing.pitch.value
     else:
-        take(settings.pitch_field, packing.pitch, False)
+        take(settings.pitch_field, packing.pitch, "size")
     settings.edge_offset = packing.edge_offset
     if isinstance(packing.orientation, str):
         settings.orientation = packing.orientation.upper()
@@ -140,7 +122,7 @@ def take_shaping(settings: Any, shaping: Shaping) -> None:
         settings.diameter_field.kind = 'CONSTANT'
         setattr(settings, "fill" if share else "diameter", size.value)
     else:
-        take(settings.diameter_field, size, share)
+        take(settings.diameter_field, size, "share" if share else "size")
     settings.seeds.clear()
     for seed in shaping.seeds:
         entry = settings.seeds.add()

@@ -18,7 +18,8 @@ class BUBBLE_PATTERN_PT_shaping(SettingsPanel, bpy.types.Panel):
         settings = shown_settings(context)
         column = columns(self.layout)
         share = settings.diameter_mode == 'SHARE'
-        draw_field(column, settings, "fill" if share else "diameter", "diameter_field", share, "Diameter")
+        constant, unit = ("fill", "share") if share else ("diameter", "size")
+        draw_field(column, settings, constant, "diameter_field", unit, "Diameter")
         column.row().prop(settings, "diameter_mode", text=" ", expand=True)
         column.prop(settings, "sizes")
         if settings.sizes == 'LIST':

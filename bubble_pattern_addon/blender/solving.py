@@ -9,8 +9,9 @@ import bpy
 
 from ..core.progress import Progress, Steps, within
 from ..core.recipe import Recipe
+from .laying import AnewOperator
 from .making_recipe import solve_of
-from .operators import AnewOperator, OnPattern, current_pattern
+from .operators import OnPattern, current_pattern
 from .settings_recipe import length_text, recipe_of, take_packing, take_shaping
 
 

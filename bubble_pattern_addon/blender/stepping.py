@@ -169,6 +169,10 @@ class SteppedOperator:
             return False
         return self._moved if event.type == 'TIMER' else event.type not in NAVIGATION
 
+    def took_long(self) -> bool:
+        """Whether the work went on while Blender drew: then its end is a step of undo."""
+        return hasattr(self, "_timer")
+
     def may_be_dragged(self) -> bool:
         """Whether the operator was set off by a slider that the mouse may still hold."""
         return False
@@ -180,7 +184,11 @@ class SteppedOperator:
         return {'CANCELLED'}
 
     def cancel(self, context: bpy.types.Context) -> None:
-        """Stop between two steps; Blender asks for it when the window closes or another file is opened."""
+        """Stop between two steps; Blender asks for it when the window closes or another file is opened, and
+        when a dialog that came before the work is turned down.
+        """
+        if not hasattr(self, "_run"):
+            return
         self._run.stop()
         self.tidy(context)
 

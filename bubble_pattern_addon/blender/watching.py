@@ -13,6 +13,8 @@ from typing import Any, NamedTuple
 import bpy
 from bpy.app.handlers import persistent
 
+from . import handling
+
 
 class Stamp(NamedTuple):
     """What an object was like: `era` counts undo, redo and opened files, `changes` those of the object."""
@@ -117,12 +119,10 @@ HANDLERS = (
 
 def register() -> None:
     """Begin to watch."""
-    for name, handler in HANDLERS:
-        getattr(bpy.app.handlers, name).append(handler)
+    handling.add(HANDLERS)
 
 
 def unregister() -> None:
     """Watch no more, and forget all."""
-    for name, handler in HANDLERS:
-        getattr(bpy.app.handlers, name).remove(handler)
+    handling.remove(HANDLERS)
     another_file()

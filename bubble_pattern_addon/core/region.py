@@ -200,17 +200,18 @@ def weld(mesh: Mesh) -> Mesh:
 
 
 def _check_geometry(base: Mesh, triangles: Ints) -> None:
-    corners = base.vertices[base.triangles[triangles]]
-    bad = ~np.isfinite(corners).all(axis=(1, 2))
+    rows = base.triangles[triangles]
+    bad = ~np.isfinite(base.vertices).all(axis=1)[rows].all(axis=1)
     if bad.any():
         raise RegionError(
             f"{_count(bad, 'face')} of the target region has a coordinate that is not a number (first: face "
             f"{triangles[bad][0]}): repair or delete these faces."
         )
-    edges = corners - np.roll(corners, 1, axis=1)
-    longest = (edges**2).sum(axis=2).max(axis=1)
-    twice_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
-    flat = twice_area <= FLAT * longest
+    corners = base.vertices[rows]
+    edges = corners - corners[:, [2, 0, 1]]
+    longest = np.einsum("tkc,tkc->tk", edges, edges).max(axis=1)
+    across = np.cross(edges[:, 0], edges[:, 1])
+    flat = np.einsum("tc,tc->t", across, across) <= (FLAT * longest) ** 2
     if flat.any():
         at = corners[flat][0].mean(axis=0)
         raise RegionError(
@@ -228,10 +229,11 @@ def _adjacency(rows: Ints) -> tuple[Ints, Ints]:
     """Neighbour and opposite corner across the edge opposite to each corner, both (R, 3)."""
     start, end = np.roll(rows, -1, axis=1).ravel(), np.roll(rows, -2, axis=1).ravel()
     low, high = np.minimum(start, end), np.maximum(start, end)
-    order = np.lexsort((high, low))
-    same = (np.diff(low[order]) == 0) & (np.diff(high[order]) == 0)
-    group = np.concatenate([[0], np.cumsum(~same)])
-    pair = np.flatnonzero(same & (np.bincount(group)[group[:-1]] == 2))
+    edge = low * (rows.max(initial=0) + 1) + high
+    order = np.argsort(edge, kind="stable")
+    same = np.diff(edge[order]) == 0
+    # in runs of two: a third triangle at an edge makes it part of the boundary
+    pair = np.flatnonzero(same & ~np.append(False, same[:-1]) & ~np.append(same[1:], False))
     one, two = order[pair], order[pair + 1]
     facing = start[one] == end[two]
     one, two = one[facing], two[facing]

@@ -186,6 +186,73 @@ def long_update(pattern: bpy.types.Object) -> Iterator[float]:
     settings.live = True
 
 
+def long_change() -> Iterator[float]:
+    """A change that takes long to follow, and a quick one after it: two steps of undo, and of redo."""
+    stepping, live, runs = module("stepping"), module("live"), module("runs")
+    kept = stepping.PATIENCE, live.PATIENCE
+    stepping.PATIENCE = live.PATIENCE = 0.0  # all is long
+    states = []
+
+    def followed() -> bool:
+        settings = the_pattern().bubble_pattern
+        return runs.under_way() is None and not module("settings_recipe").is_outdated(settings)
+
+    def step(action: str) -> Iterator[float]:
+        with inside('WINDOW'):
+            getattr(bpy.ops.ed, action)()
+        yield 0.5
+        yield from until(followed)
+        settings = the_pattern().bubble_pattern
+        states.append([settings.count, round(settings.diameter, 6)])
+
+    edited("Before")
+    settings = the_pattern().bubble_pattern
+    before = settings.count
+    settings.diameter_mode = 'SIZE'
+    edited("Size")
+    settings.diameter = 0.5 * settings.pitch
+    edited("Diameter")
+    yield 1.0
+    start = [before, round(settings.diameter, 6)]
+    settings.pitch = 0.8 * settings.pitch
+    edited("Pitch")
+
+    yield 0.5
+    yield from until(followed)
+    settings = the_pattern().bubble_pattern
+    laid = [settings.count, round(settings.diameter, 6)]
+    settings.diameter = 0.4 * settings.pitch
+    edited("Smaller")
+    last = [settings.count, round(settings.diameter, 6)]
+    for action in ("undo", "undo", "redo", "redo", "undo", "undo"):
+        yield from step(action)
+    found["undo and redo of a long change"] = states == [laid, start, laid, last, laid, start]
+    found["states"] = [start, laid, last, states]
+    stepping.PATIENCE, live.PATIENCE = kept
+
+
+def asking() -> Iterator[float]:
+    """A feature moved by hand: Update asks, and Esc leaves it where it is."""
+    settings = the_pattern().bubble_pattern
+    the_pattern().data.vertices[0].co.x += 0.3 * settings.pitch
+    the_pattern().data.update_tag()
+    edited("Move")
+    place = region('WINDOW')
+    (window,) = bpy.context.window_manager.windows
+    window.event_simulate(type='MOUSEMOVE', value='NOTHING', x=place.x + 200, y=place.y + 300)
+    yield 0.3
+    with inside('WINDOW'):
+        found["asked"] = sorted(bpy.ops.bubble_pattern.update('INVOKE_DEFAULT'))
+    yield from photo("3-asked")
+    for value in ('PRESS', 'RELEASE'):
+        window.event_simulate(type='ESC', value=value)
+    yield 0.5
+    found["moved after Esc"] = module("hand_state").by_hand(the_pattern()).moved
+    with inside('UI'):
+        bpy.ops.bubble_pattern.update()
+    edited("Update")
+
+
 def story() -> Iterator[float]:
     """What a designer does; yields the seconds to wait."""
     base = dome()
@@ -198,6 +265,8 @@ def story() -> Iterator[float]:
     yield from adding()
     yield from live_changes(the_pattern())
     yield from long_update(the_pattern())
+    yield from long_change()
+    yield from asking()
     yield from editing()
     yield from cancelling()
     yield from applying()

@@ -691,7 +691,7 @@ def test_the_sidebar_shows_what_a_kind_needs() -> None:
     for kind in ('CONSTANT', *KIND_NAMES, 'RECIPE'):
         field.kind = kind
         drawn: list[str] = []
-        field_panels.draw_field(Layout(drawn), settings, "diameter", "diameter_field", False, "Diameter")
+        field_panels.draw_field(Layout(drawn), settings, "diameter", "diameter_field", "size", "Diameter")
         assert "kind" in drawn
         assert ("diameter" in drawn) == (kind == 'CONSTANT')
         assert ("start_size" in drawn) == ("falloff" in drawn) == (kind in KIND_NAMES)
@@ -700,7 +700,7 @@ def test_the_sidebar_shows_what_a_kind_needs() -> None:
     for about, shown in (('POINT', "centre"), ('OBJECT', "object")):
         field.about = about
         drawn = []
-        field_panels.draw_field(Layout(drawn), settings, "fill", "diameter_field", True, "Diameter")
+        field_panels.draw_field(Layout(drawn), settings, "fill", "diameter_field", "share", "Diameter")
         assert {shown, "start_share", "axis"} <= set(drawn)
     field.kind = 'CONSTANT'
     for cls in (packing_panel.BUBBLE_PATTERN_PT_packing, shaping_panel.BUBBLE_PATTERN_PT_shaping):
@@ -736,7 +736,7 @@ def test_a_curve_of_one_s_own_goes_through_its_five_heights() -> None:
     assert (field.kind, field.falloff) == ('LINEAR', 'CURVE')
     assert tuple(field.heights) == pytest.approx((0.0, 0.9, 1.0, 0.2, 0.0))
     drawn: list[str] = []
-    field_panels.draw_field(Layout(drawn), settings, "diameter", "diameter_field", False, "Diameter")
+    field_panels.draw_field(Layout(drawn), settings, "diameter", "diameter_field", "size", "Diameter")
     assert "heights" in drawn
 
 

@@ -180,7 +180,7 @@ def test_unpin() -> None:
     assert np.array_equal(np.flatnonzero(shown(pattern, "pinned")), [numbers[1]])
     assert len(pattern.bubble_pattern.pins) == 1
     bpy.ops.object.mode_set(mode='OBJECT')
-    with pytest.raises(RuntimeError, match="Go to Edit Mode"):
+    with pytest.raises(RuntimeError, match="Go to Edit Mode of the pattern and move features"):
         bpy.ops.bubble_pattern.settle()
 
 

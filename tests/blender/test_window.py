@@ -190,6 +190,9 @@ def test_a_designer_s_first_hour(screen: None, tmp_path: Path) -> None:
     assert found["zoomed while packing"]
     assert found["still packing"]
     assert found["after the right click"] == [True, True, "Grid Pattern"]
+    assert found["undo and redo of a long change"], found["states"]
+    assert found["asked"] == ["RUNNING_MODAL"]
+    assert found["moved after Esc"] == 1
     assert found["long apply"] == ["RUNNING_MODAL"]
     assert found["objects after Esc"] == ["Grid", "Grid Pattern"]
     assert found["base after Esc"]
@@ -197,6 +200,6 @@ def test_a_designer_s_first_hour(screen: None, tmp_path: Path) -> None:
     assert found["euler"] == 2 - 2 * found["holes"]
     assert found["verdict"] == ""
     assert min(found[suffix] for suffix in ("stl", "csv", "dxf")) > 10_000
-    for name in ("1-select", "2-add", "3-settling", "4-wider", "5-slots", "6-cancelled", "7-part"):
+    for name in ("1-select", "2-add", "3-settling", "3-asked", "4-wider", "5-slots", "6-cancelled", "7-part"):
         assert (tmp_path / f"{name}.png").stat().st_size > 50_000
     assert picture.stat().st_size > 50_000

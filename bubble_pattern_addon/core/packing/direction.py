@@ -15,85 +15,98 @@ from scipy.sparse import coo_array, csr_array, diags_array
 
 from ..mesh import Bools, Floats, Ints
 from ..surface import Charts, Complex, product
+from .symmetric_field import Alike, most_alike, on_patches
 
-# Diffusion per round as a share of the area, falling: far misfits first, near ones after.
-SPREAD = (0.003, 0.0005)
-ROUNDS, LAST_ROUNDS = 12, 3
-# Patches of triangles that are enough for the far misfits.
-ENOUGH = 2500
+# Diffusion per round as a share of the area, and rounds of it.
+SPREAD, ROUNDS = 0.001, 14
+# Patches of triangles that are enough for that; on finer ones values are so often evened with those beside.
+ENOUGH = 1200
+EVENINGS = 3
 # A round is solved to this share of its right side, in at most so many steps.
 NEARLY = 0.05
 MOST_STEPS = 200
 
 
-def smooth_directions(charts: Charts, chosen: Bools) -> Complex:
+def smooth_directions(charts: Charts, chosen: Bools, alike: Alike | None = None) -> Complex:
     """Sixth powers of unit row directions in the frames of the triangles, (R,); 0 where not `chosen` (R,).
 
-    chosen: triangles of whole connected parts
+    chosen: triangles of whole connected parts without a boundary; alike: makes such values (R,) what they
+    shall stay, such as symmetric
     """
     region = charts.region
-    result = np.zeros(len(chosen), dtype=np.complex128)
-    place = np.full(len(chosen), -1)
     members = np.flatnonzero(chosen)
-    place[members] = np.arange(len(members))
-    row, corner = np.nonzero((region.neighbours >= 0) & chosen[:, None])
-    beyond = region.neighbours[row, corner]
-    middle = region.corners.mean(axis=1)
-    ends = region.corners[row, (corner + 1) % 3] - region.corners[row, (corner + 2) % 3]
-    weight = np.linalg.norm(ends, axis=1) / np.linalg.norm(middle[row] - middle[beyond], axis=1)
-    area = np.linalg.norm(region.area_vectors[members], axis=1) / 2
-    transport = charts.turns[row, corner] ** 6
-    n = len(members)
-    # Row `beyond` of the Laplacian takes the neighbour's value, turned into its own frame.
-    links = coo_array((weight * transport, (place[beyond], place[row])), shape=(n, n))
-    degree = np.bincount(place[row], weight, n)
-    laplacian = (diags_array(degree.astype(np.complex128)) - links).tocsr()
-    parts = np.bincount(region.sheet[members], area, int(region.sheet.max()) + 1)[region.sheet[members]]
-    area = area / parts
+    area = np.linalg.norm(region.area_vectors[members], axis=1)
+    share = area / np.bincount(region.sheet[members], area)[region.sheet[members]]
     # Far misfits meet as well between patches of triangles, which are few; the triangles finish it.
-    patches, coarse, share = [], laplacian, area
+    levels, coarse = [], _laplacian(charts, members)
     while coarse.shape[0] > ENOUGH:
-        patch, turn = _paired(coarse)
-        patches.append((patch, turn))
+        patch, turn = _patches(coarse)
+        levels.append((coarse, patch, turn))
         coarse, share = _merged(coarse, patch, turn), np.bincount(patch, share)
     # The frames' own directions, which are at odds: from a smooth start, such as one direction of space seen
     # on the surface, the misfits that belong to it never part.
-    value = np.ones(coarse.shape[0], dtype=np.complex128)
-    for spread in SPREAD:
-        value = _diffused(coarse, share, value, spread, ROUNDS)
-    for patch, turn in reversed(patches):
-        value = product(value[patch], turn)
-    if patches:
-        value = _evened(laplacian, value, LAST_ROUNDS)
+    value = _diffused(coarse, share, np.ones(coarse.shape[0], dtype=np.complex128))
+    if alike is not None:
+        kept = on_patches(alike, members, len(chosen), [(patch, turn) for _, patch, turn in levels])
+        value = _diffused(coarse, share, most_alike(kept, value), kept)
+    for finer, patch, turn in reversed(levels):
+        value = _evened(finer, product(value[patch], turn))
+    result = np.zeros(len(chosen), dtype=np.complex128)
     result[members] = value
+    if alike is not None:
+        result = alike(result)
+        result[members] /= np.maximum(np.abs(result[members]), 1e-300)
     return result
 
 
-def _paired(laplacian: csr_array) -> tuple[Ints, Complex]:
+def _laplacian(charts: Charts, members: Ints) -> csr_array:
+    """How much the value of each of the n triangles `members` differs from those beside it, (n, n)."""
+    corners, n = charts.region.corners, len(members)
+    beyond = charts.region.neighbours[members]
+    place = np.full(len(corners), -1, dtype=np.int32)
+    place[members] = np.arange(n)
+    edges = np.roll(charts.corners[members], -2, axis=1) - np.roll(charts.corners[members], -1, axis=1)
+    middle = (corners[:, 0] + corners[:, 1] + corners[:, 2]) / 3
+    across = middle[members, None] - middle[beyond]
+    weight = np.abs(edges) / np.sqrt(np.einsum("nkc,nkc->nk", across, across))
+    # A neighbour's value is turned into the triangle's own frame.
+    back = charts.turns[members].conj().ravel()
+    cube = product(product(back, back), back)
+    column = np.concatenate([np.arange(n, dtype=np.int32)[:, None], place[beyond]], axis=1)
+    link = np.concatenate([weight.sum(axis=1)[:, None], -weight * product(cube, cube).reshape(n, 3)], axis=1)
+    return csr_array((link.ravel(), column.ravel(), 4 * np.arange(n + 1)), shape=(n, n))
+
+
+def _patches(laplacian: csr_array) -> tuple[Ints, Complex]:
     """The larger patch (n,) that each of n patches is a part of, and the turn (n,) that brings its value into
-    the small one's own frame: patches that have each other for best neighbour are joined in pairs.
+    the small one's own frame.
+
+    Every patch that ranks above all beside it leads one; the others follow the leader they have most in
+    common with, or else one that somebody beside them follows.
     """
     n = laplacian.shape[0]
-    row = np.repeat(np.arange(n), np.diff(laplacian.indptr))
+    row, number = np.repeat(np.arange(n), np.diff(laplacian.indptr)), np.arange(n)
     column, link = laplacian.indices, laplacian.data
     beside = row != column
     row, column, link = row[beside], column[beside], link[beside]
-    # Links of equal weight are told apart by an even scatter, else few are each other's best.
-    low, high = np.minimum(row, column).astype(np.float64), np.maximum(row, column)
-    weight = np.abs(link) * (1 + 0.3 * np.modf(low * 0.6180339887 + high * 0.4142135624)[0])
+    # An even scatter: leaders stand apart, and none has a long queue behind it.
+    rank = np.modf(number * 0.6180339887)[0]
     begins = np.flatnonzero(np.append(True, np.diff(row) != 0)[: len(row)])
-    heaviest = np.full(n, -1.0)
-    heaviest[row[begins]] = np.maximum.reduceat(weight, begins) if len(row) else weight
-    first = np.flatnonzero(weight == heaviest[row])[::-1]
-    best, turn = np.full(n, -1), np.ones(n, dtype=np.complex128)
-    best[row[first]] = column[first]
-    turn[row[first]] = -link[first] / np.abs(link[first])
-    number = np.arange(n)
-    mutual = (best >= 0) & (best[best] == number)
-    follows = mutual & (best < number)
-    leader = np.where(follows, best, number)
-    place = np.cumsum(~follows) - 1
-    return place[leader], np.where(follows, turn, 1.0)
+    highest = np.full(n, -1.0)
+    highest[row[begins]] = np.maximum.reduceat(rank[column], begins) if len(row) else rank
+    leader = np.where(rank > highest, number, -1)
+    turn = np.ones(n, dtype=np.complex128)
+    for _ in range(2):
+        may = (leader[row] < 0) & (leader[column] >= 0)
+        follower, ahead, common = row[may], column[may], link[may]
+        order = np.lexsort((-np.abs(common), follower))
+        best = order[np.append(True, np.diff(follower[order]) != 0)[: len(order)]]
+        follower, ahead, common = follower[best], ahead[best], common[best]
+        turn[follower] = product(-common / np.abs(common), turn[ahead])
+        leader[follower] = leader[ahead]
+    leader = np.where(leader < 0, number, leader)
+    place = np.cumsum(leader == number) - 1
+    return place[leader], turn
 
 
 def _merged(laplacian: csr_array, patch: Ints, turn: Complex) -> csr_array:
@@ -104,20 +117,21 @@ def _merged(laplacian: csr_array, patch: Ints, turn: Complex) -> csr_array:
     return coo_array((link, (patch[row], patch[column])), shape=(n, n)).tocsr()
 
 
-def _evened(laplacian: csr_array, value: Complex, rounds: int) -> Complex:
-    """Unit values, each `rounds` times the mean of its own and its neighbours'."""
+def _evened(laplacian: csr_array, value: Complex) -> Complex:
+    """Unit values, each EVENINGS times the mean of its own and its neighbours'."""
     own = 1 / laplacian.diagonal().real
-    for _ in range(rounds):
+    for _ in range(EVENINGS):
         value = value - 0.5 * own * (laplacian @ value)
         value = value / np.maximum(np.abs(value), 1e-300)
     return value
 
 
-def _diffused(laplacian: csr_array, area: Floats, value: Complex, spread: float, rounds: int) -> Complex:
-    """Unit values after `rounds` of diffusing and normalising."""
-    implicit = (diags_array(area.astype(np.complex128)) + spread * laplacian).tocsr()
-    for _ in range(rounds):
+def _diffused(laplacian: csr_array, area: Floats, value: Complex, kept: Alike | None = None) -> Complex:
+    """Unit values after ROUNDS of diffusing and normalising, each `kept` what it shall stay."""
+    implicit = (diags_array(area.astype(np.complex128)) + SPREAD * laplacian).tocsr()
+    for _ in range(ROUNDS):
         value = _solved(implicit, area * value, value)
+        value = value if kept is None else kept(value)
         value = value / np.maximum(np.abs(value), 1e-300)
     return value
 

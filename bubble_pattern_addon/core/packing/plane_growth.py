@@ -67,19 +67,19 @@ def grown_in_plane(
     clear: float,
     edge_offset: float,
 ) -> Steps[Spots]:
-    """Places of a lattice grown from each of `seeds`, one for each part of a flat region, with a row along
+    """Places of a lattice grown from `seeds`, one or more for each part of a flat region, with a row along
     the direction that each has, as far as they are farther inside the boundary than `clear` pitches and the
     edge offset.
     """
     found: list[Spots] = []
     heading = product(directions, charts.plane.turn[seeds.row])
-    for sheet in range(len(seeds.row)):
+    for sheet in range(int(charts.region.sheet.max()) + 1):
         rows = np.flatnonzero(charts.region.sheet == sheet)
-        origin = positions(charts, seeds.take(np.array([sheet])))
-        raster = _raster(charts, boundary, pitch, rows, origin[0])
-        start = in_plane(charts, origin)
-        lattice = yield from _grown(charts, raster, origin[0], start, heading[[sheet]])
-        points, enough = _in_space(charts, origin[0], lattice.at), clear * lattice.pitch + edge_offset
+        own = np.flatnonzero(charts.region.sheet[seeds.row] == sheet)
+        starts = positions(charts, seeds.take(own))
+        raster = _raster(charts, boundary, pitch, rows, starts[0])
+        lattice = yield from _grown(charts, raster, starts[0], in_plane(charts, starts), heading[own])
+        points, enough = _in_space(charts, starts[0], lattice.at), clear * lattice.pitch + edge_offset
         # A distance changes by no more than the way: who is far inside need not be measured.
         node, off = _nodes(raster, lattice.at)
         kept = raster.inside[node] - np.abs(off) > enough
@@ -201,7 +201,7 @@ def _tree(at: Complex) -> cKDTree:
 
 
 def _grown(charts: Charts, raster: Raster, origin: Floats, start: Complex, heading: Complex) -> Steps[Front]:
-    """The lattice over one part of the region from one bubble on, generation after generation."""
+    """The lattice over one part of the region from its first bubbles on, generation after generation."""
     crowd, front = _Crowd(), _front(raster, start, heading)
     generations = [front]
     expected = float((raster.inside > 0).sum()) * raster.spacing**2 / float(np.mean(raster.pitch)) ** 2
