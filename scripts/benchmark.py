@@ -32,13 +32,15 @@ from bubble_pattern_addon.core.distance import boundary_distance
 from bubble_pattern_addon.core.fields import Linear, Radial
 from bubble_pattern_addon.core.mesh import Floats, Mesh
 from bubble_pattern_addon.core.metric import Constant
+from bubble_pattern_addon.core.part import Part
 from bubble_pattern_addon.core.pattern import Pattern
 from bubble_pattern_addon.core.pipeline import pattern_steps
+from bubble_pattern_addon.core.plan import plan_steps
 from bubble_pattern_addon.core.progress import drive
 from bubble_pattern_addon.core.quality import Quality, measure, measure_points
 from bubble_pattern_addon.core.recipe import Feature, Packing, Recipe, Shaping
 from bubble_pattern_addon.core.region import Region, make_region
-from bubble_pattern_addon.core.solid import Part, part_steps, plan_steps
+from bubble_pattern_addon.core.solid import part_steps
 from bubble_pattern_addon.core.soundness import forget_base
 from scripts import peers
 from scripts.shapes import SHAPES, Shape, circle, curved_slab, plate, rectangle_outline, trapezoid_outline
