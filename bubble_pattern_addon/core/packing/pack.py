@@ -209,9 +209,10 @@ def _settled(
 def _near_changes(ground: Ground, before: Bubbles, after: Bubbles) -> Bools:
     """Which of the bubbles `after` population control may move, (n,): those near whoever has come or gone."""
     then, now = (positions(ground.charts, bubbles.spots) for bubbles in (before, after))
-    old, new = cKDTree(then), cKDTree(now)
-    came, went = old.query(now)[0] > 0, new.query(then)[0] > 0
-    changes = cKDTree(np.concatenate([now[came], then[went]]))
+    # Whoever stayed stands exactly where it stood.
+    old, new = (points[:, 0] + np.pi * points[:, 1] + np.e * points[:, 2] for points in (then, now))
+    changed = np.concatenate([now[~np.isin(new, old)], then[~np.isin(old, new)]])
+    changes = cKDTree(changed, balanced_tree=False, compact_nodes=False)
     return np.asarray(changes.query(now)[0] < STIRRED * local_pitch(ground, after))
 
 

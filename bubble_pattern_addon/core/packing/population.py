@@ -304,8 +304,8 @@ def _circumcircles(corners: Floats) -> tuple[Floats, Floats]:
 def _empty(ground: Ground, spots: Spots, at: Floats, points: Floats, row: Ints, radius: Floats) -> Bools:
     """Whether no bubble of the same side of the surface is within `radius` of the places."""
     reach = float(radius.max(initial=0.0))
-    places = cKDTree(at)
-    near = places.sparse_distance_matrix(cKDTree(points), reach, output_type="ndarray")
+    places, others = (cKDTree(each, balanced_tree=False, compact_nodes=False) for each in (at, points))
+    near = places.sparse_distance_matrix(others, reach, output_type="ndarray")
     place, other, distance = near["i"], near["j"], near["v"]
     taken = (distance <= radius[place]) & ground.charts.region.same_side(spots.row[place], row[other])
     return np.bincount(place[taken], minlength=len(at)) == 0

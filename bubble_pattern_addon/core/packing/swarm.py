@@ -24,7 +24,7 @@ from .orbits import HALO, Followers, followers_of, held
 SKIN = 0.16
 # Pairs of bubbles of different sizes take long to find: they are listed out to this reserve as well, which
 # holds for several of the shorter lists: until a bubble has moved so far, in pitches.
-WIDE_SKIN, WIDE_MOVED = 0.7, 0.4
+WIDE_SKIN, WIDE_MOVED = 0.9, 0.5
 # Where a smaller share of the bubbles has moved, listing their pairs alone is quicker than all anew.
 RENEWABLE = 0.3
 # Where fewer bubbles are at work, telling some apart from the others costs more than it spares.
