@@ -64,10 +64,10 @@ TURNS = (0.0, 15.0, 30.0, 45.0)
 # .95 itself, by how far its gaps are evened out.
 CRAMPED = 1.04
 # Rounds of relaxation and population control, by the share of the recipe's steps that each may take (whoever
-# comes or goes after the first stirs but a few neighbours, and in a graded pattern is soonest gone), as long
-# as more than this share of the bubbles came or went: the last phase evens it out.
+# comes or goes after the first stirs but a few neighbours), as long as more than this share of the bubbles came
+# or went: the last phase evens it out. In a graded pattern, where many do, it does so best at once.
 ROUNDS = (Fraction(1), Fraction(1, 2), Fraction(1, 2))
-ROUNDS_GRADED = (Fraction(2, 3), Fraction(1, 3))
+ROUNDS_GRADED = (Fraction(2, 3),)
 FEW_CHANGED = 0.01
 # Steps of the last phase, and how often it may be done again.
 STIFF_STEPS, LAST_ROUNDS = 45, 4
@@ -170,9 +170,9 @@ def _settled(
         settle = relax_steps if packing.integrator == "fire" else integration_steps
         steps = max(int(packing.iterations * share), 1)
         settling = settle(ground, bubbles, filling(ground, bubbles, local), steps, packing.tolerance)
-        bubbles, _ = yield from within(settling, 0.2 + 0.2 * number, 0.4 + 0.2 * number)
+        bubbles, work = yield from within(settling, 0.2 + 0.2 * number, 0.4 + 0.2 * number)
         bubbles, local = _on_planes_again(ground, bubbles, local)
-        bubbles, changed = control(ground, bubbles, local)
+        bubbles, changed = control(ground, bubbles, local, near=work.near)
         if changed <= FEW_CHANGED * len(bubbles):
             break
     yield Progress("Evening out the gaps", 0.8)
@@ -191,12 +191,12 @@ def _settled(
             moving,
             stage="Evening out the gaps",
         )
-        bubbles, _ = yield from within(evening, 0.8, 0.95)
+        bubbles, work = yield from within(evening, 0.8, 0.95)
         # What stiff contacts have squeezed through the first row has no place between it and the boundary,
         # and what these have opened another bubble may fit into.
         bubbles, local = _on_planes_again(ground, bubbles, local_pitch(ground, bubbles))
         before, more = bubbles, number + 1 < LAST_ROUNDS
-        bubbles, changed = control(ground, bubbles, local, True, more, among=moving)
+        bubbles, changed = control(ground, bubbles, local, True, more, moving, work.near)
         if not changed:
             break
         if ground.uniform is None and ground.symmetry is None:

@@ -12,7 +12,7 @@ from ..surface import Charts, Spots, positions, to_frame, walk
 from .bubbles import Bubbles, Ground, joined
 from .crowding import close_pairs, uncrowded
 from .domain import led_here
-from .force import Pairs, find_pairs
+from .force import Pairs, find_pairs, within_reach
 from .orbits import HALO, SEEN, followers_of, leaders_of, on_their_planes, ranked, settled_leaders
 
 # A circle through three bubbles with no other inside is a void when its radius is above this share of the
@@ -53,12 +53,14 @@ def control(
     last: bool = False,
     filling: bool = True,
     among: Bools | None = None,
+    near: Pairs | None = None,
 ) -> tuple[Bubbles, int]:
     """Bubbles without the too crowded ones and with new ones in the voids; and how many came or went.
 
     In a symmetric pattern these are the leaders, and whoever comes or goes does so with its followers. At
     the `last` only those that are pressed out go, and only voids that another bubble fits into are filled,
     if there is to be any `filling`; only between bubbles `among` (n,) of these, if that is given.
+    The pairs that are close enough are among those `near`, if these are known.
     """
     spots, n, m = bubbles.spots, len(bubbles), bubbles.fixed
     points, row, owner = positions(ground.charts, spots), spots.row, np.arange(n)
@@ -67,7 +69,10 @@ def control(
         points, row = np.concatenate([points, followers.points]), np.concatenate([row, followers.row])
         owner = np.concatenate([owner, followers.leader])
     everywhere = pitch[owner]
-    pairs = find_pairs(ground.charts, points, row, everywhere, 0.0)
+    if near is None:
+        pairs = find_pairs(ground.charts, points, row, everywhere, 0.0)
+    else:
+        pairs = within_reach(near, points, 0.0)
     distance = np.linalg.norm(points[pairs.first] - points[pairs.second], axis=1)
     ratio = overlap_ratio(pairs, distance, everywhere)
     gone = _pressed_out(ground, bubbles, pitch, pairs)

@@ -38,11 +38,14 @@ OFF = 0.01
 
 @dataclass
 class Work:
-    """What a relaxation has cost: force evaluations, and the bubbles and pairs these went over."""
+    """What a relaxation has cost: force evaluations, and the bubbles and pairs these went over; and what it
+    knows at its end: pairs near enough to feel each other, with others that are not, where it has a wide list.
+    """
 
     evaluations: int = 0
     bubbles: int = 0
     pairs: int = 0
+    near: Pairs | None = None
 
 
 @dataclass
@@ -172,6 +175,9 @@ def bubbles_of(swarm: Swarm) -> Bubbles:
     """The bubbles where the swarm has them."""
     n = len(swarm.bubbles)
     _walk_there(swarm, np.flatnonzero((swarm.points[:n] != swarm.landed[:n]).any(axis=1)))
+    if swarm.wide is not None and swarm.followers is None:
+        _renew_wide(swarm)
+        swarm.work.near = None if swarm.wide is None else swarm.wide[0]
     return Bubbles(Spots(swarm.row[:n], swarm.bary[:n]), swarm.bubbles.fixed)
 
 
