@@ -192,8 +192,10 @@ def _slope(charts: Charts, pitch: Lengths, spots: Spots, local: Floats) -> Compl
     """Slope (n,) of the pitch at the places, where it is `local` (n,), in their triangles' frames."""
     step = 1e-4 * local
     gradients = charts.gradients[spots.row] * step[:, None]
-    beside = [pitch(Spots(spots.row, spots.barycentric + part)) for part in (gradients.real, gradients.imag)]
-    return ((beside[0] - local) + 1j * (beside[1] - local)) / step
+    slope = np.empty(len(local), dtype=np.complex128)
+    slope.real = (pitch(Spots(spots.row, spots.barycentric + gradients.real)) - local) / step
+    slope.imag = (pitch(Spots(spots.row, spots.barycentric + gradients.imag)) - local) / step
+    return slope
 
 
 def _agreed(

@@ -52,6 +52,8 @@ from .symmetric_start import loop_starts, suiting, symmetric_seeds
 MOST = 1_000_000
 # Lattice bubbles nearer to the boundary than this many pitches give way to the first row.
 CLEAR_OF_RIM = 1.0
+# In so many parts of a flat region graded lattices grow one by one in the plane, in more all at once.
+PARTS = 8
 # A straight stretch of the first row sets the lattice's direction when it is longer than this, in pitches.
 LONG_ENOUGH = 6.0
 # Bubbles of the first row closer than this, as across a narrow neck, do not both fit.
@@ -314,7 +316,8 @@ def _lattice(ground: Ground, seeds: Spots, directions: Complex) -> Steps[Spots]:
         wanted = partial(led_here, ground, pitch=np.float64(uniform))
         return lay(charts, ground.boundary, uniform, clear, seeds, directions, origin, wanted)
     seeds, directions, _ = symmetric_seeds(ground, seeds, directions, anywhere=False)
-    if charts.region.flat and ground.boundary is not None and ground.uniform is None:
+    few = int(charts.region.sheet.max()) < PARTS
+    if charts.region.flat and ground.boundary is not None and ground.uniform is None and few:
         seeds, directions = with_plane_rows(ground, seeds, directions, None)
         asked = ground.pitch, seeds, directions, CLEAR_OF_RIM, ground.edge_offset
         return (yield from grown_in_plane(charts, ground.boundary, *asked))

@@ -25,6 +25,8 @@ from .plane import all_found
 # A raster has so many nodes for each bubble that there will be, but neither fewer than FEWEST nor more than
 # MOST_NODES.
 NODES, FEWEST, MOST_NODES = 0.4, 500, 30_000
+# No step is made as if the pitch grew or fell faster than by this per length.
+STEEP = 0.8
 # From a node to the places round it the pitch does not fall below this share of itself.
 LEAST = 0.3
 # Where a place in the middle of the region is farther than this from all bubbles, in pitches, the lattice
@@ -108,7 +110,8 @@ def _raster(charts: Charts, boundary: Boundary, pitch: Lengths, rows: Ints, orig
     wanted = NODES * float((area / local**2).sum()) * wide * high / area.sum()
     spacing = float(np.sqrt(wide * high / np.clip(wanted, FEWEST, MOST_NODES)))
     columns, lines = int(np.ceil(wide / spacing)) + 1, int(np.ceil(high / spacing)) + 1
-    nodes = low + spacing * (np.arange(columns) + 1j * np.arange(lines)[:, None]).ravel()
+    nodes = _complex(np.tile(np.arange(columns), lines), np.repeat(np.arange(lines), columns))
+    nodes = low + spacing * nodes
     points = _in_space(charts, origin, nodes)
     inside = inside_distance(boundary, points, np.full(len(nodes), rows[0]))
     post = nearest_signpost(charts, nodes, rows[:1])
@@ -116,11 +119,18 @@ def _raster(charts: Charts, boundary: Boundary, pitch: Lengths, rows: Ints, orig
     # Beyond the boundary the metric goes on as it is in the nearest triangle, within its own bounds.
     value = pitch(Spots(np.where(there, spots.row, post), _seen_from(charts, spots, post, there, nodes)))
     known = value[there] if there.any() else local
-    value = np.clip(value, known.min(), known.max())
+    value = np.clip(np.nan_to_num(value, nan=float(known.mean())), known.min(), known.max())
     shape = lines, columns
     return Raster(
         low, spacing, columns, value, _slope(value, shape, spacing), inside, _slope(inside, shape, spacing)
     )
+
+
+def _complex(real: Floats | Ints, imaginary: Floats | Ints) -> Complex:
+    """Complex numbers (n,) from their parts."""
+    both = np.empty((len(real), 2))
+    both[:, 0], both[:, 1] = real, imaginary
+    return both.view(np.complex128)[:, 0]
 
 
 def _seen_from(charts: Charts, spots: Spots, post: Ints, there: Bools, nodes: Complex) -> Floats:
@@ -135,7 +145,7 @@ def _seen_from(charts: Charts, spots: Spots, post: Ints, there: Bools, nodes: Co
 def _slope(value: Floats, shape: tuple[int, int], spacing: float) -> Complex:
     """Slope (k,) of values (k,) at the nodes of a grid of such a shape."""
     up, across = np.gradient(value.reshape(shape), spacing)
-    return (across + 1j * up).ravel()
+    return _complex(across.ravel(), up.ravel())
 
 
 def _nodes(raster: Raster, at: Complex) -> tuple[Ints, Complex]:
@@ -261,11 +271,15 @@ def _born(raster: Raster, crowd: _Crowd, front: Front) -> Front:
     close = (first != second) & (np.abs(bubbles.at[first] - bubbles.at[second]) < reach)
     rank = np.lexsort((np.arange(len(votes)), -votes)).argsort()
     kept = uncrowded(np.stack([first[close], second[close]], axis=1), rank)
-    return Front(*(column[kept] for column in bubbles))
+    return _taken(bubbles, kept)
+
+
+def _taken(front: Front, which: Bools) -> Front:
+    return Front(front.at[which], front.heading[which], front.pitch[which], front.slope[which])
 
 
 def _summed(group: Ints, values: Complex) -> Complex:
-    return np.bincount(group, values.real) + 1j * np.bincount(group, values.imag)
+    return _complex(np.bincount(group, values.real), np.bincount(group, values.imag))
 
 
 def _proposals(raster: Raster, crowd: _Crowd, front: Front) -> tuple[Complex, Complex, Floats]:
@@ -273,11 +287,12 @@ def _proposals(raster: Raster, crowd: _Crowd, front: Front) -> tuple[Complex, Co
     and pitches there, (n,).
     """
     way = (front.heading[:, None] * SIX).ravel()
-    at, local, slope = (np.repeat(column, 6) for column in (front.at, front.pitch, front.slope))
+    slope = np.repeat(front.slope, 6)
     bend = half_bend(way, slope)
     way = way * bend
     # The stable distance l = (h + (h + s l)) / 2 with the slope s along the way.
-    at = at + way * (local / (1 - np.clip(_dot(way, slope), -0.8, 0.8) / 2))
+    length = np.repeat(front.pitch, 6) / (1 - np.clip(_dot(way, slope), -STEEP, STEEP) / 2)
+    at = np.repeat(front.at, 6) + way * length
     node, off = _nodes(raster, at)
     inside = np.flatnonzero(raster.inside[node] + _dot(raster.inward[node], off) > 0)
     at, heading = at[inside], (way * bend)[inside]

@@ -38,8 +38,8 @@ OFF = 0.01
 
 @dataclass
 class Work:
-    """What a relaxation has cost: force evaluations, and the bubbles and pairs these went over; and what it
-    knows at its end: pairs near enough to feel each other, with others that are not, where it has a wide list.
+    """What a relaxation has cost: force evaluations, and the bubbles and pairs these went over; and from its
+    wide list, where it has one, the pairs `near` enough at its end to feel each other, among others.
     """
 
     evaluations: int = 0
