@@ -230,7 +230,7 @@ def _relaxed(ground: Ground, crowd: _Crowd, recipe: Recipe, gaps: Floats, fill_v
     crowd = _taken(crowd, np.argsort(crowd.free, kind="stable"))
     fixed = int((~crowd.free).sum())
     room = np.zeros(len(crowd.ids))
-    for number in range(ROUNDS):
+    for number in range(len(ROUNDS)):
         yield Progress("Settling the bubbles", 0.2 + 0.2 * number)
         size, room = _sizes(ground, crowd, gaps)
         bubbles, _ = relax(ground, Bubbles(crowd.spots, fixed), size, packing.iterations, packing.tolerance)

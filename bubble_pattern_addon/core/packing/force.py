@@ -18,7 +18,7 @@ STIFFNESS = 12.0
 # The last phase pushes pairs apart that are closer than this share of their stable distance.
 EVEN = 0.985
 # Bubbles whose pitches differ by no more than this factor are of one size class.
-CLASS = 1.6
+CLASS = 1.4
 # No bubble has more others near: on a crowded spot a dozen have room within 1.66 pitches, and as many on the
 # other side of a thin wall.
 MOST_NEAR = 28

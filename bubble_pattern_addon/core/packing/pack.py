@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from fractions import Fraction
 from functools import partial
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..boundary import make_boundary, nearest_boundary, signature
 from ..errors import RegionError
 from ..isometries import OFF
-from ..mesh import Floats
+from ..mesh import Bools, Floats
 from ..metric import Constant, Field
 from ..progress import Progress, Steps, within
 from ..quality import measure_points
@@ -28,6 +30,7 @@ from .narrows import in_the_narrows
 from .orbits import orbit_sizes, settled_leaders, symmetric_start, with_followers
 from .pins import PUSHED, check_apart, clear_of, on_surface, track_through, with_pins
 from .plane import fills_its_box, lay
+from .plane_growth import grown_in_plane
 from .plane_rows import rather_along, with_plane_rows
 from .population import control
 from .relax import relax_steps
@@ -49,6 +52,8 @@ from .symmetric_start import loop_starts, suiting, symmetric_seeds
 MOST = 1_000_000
 # Lattice bubbles nearer to the boundary than this many pitches give way to the first row.
 CLEAR_OF_RIM = 1.0
+# In so many parts of a flat region graded lattices grow one by one in the plane, in more all at once.
+PARTS = 8
 # A straight stretch of the first row sets the lattice's direction when it is longer than this, in pitches.
 LONG_ENOUGH = 6.0
 # Bubbles of the first row closer than this, as across a narrow neck, do not both fit.
@@ -60,12 +65,16 @@ TURNS = (0.0, 15.0, 30.0, 45.0)
 # defects that a closed surface must have: an even icosahedral lattice on a sphere of 1,000 has psi6 .92 to
 # .95 itself, by how far its gaps are evened out.
 CRAMPED = 1.04
-# Rounds of relaxation and population control: another is due when more than this share came or went, else the
-# last phase evens it out.
-ROUNDS, ROUNDS_GRADED = 3, 2
+# Rounds of relaxation and population control, by the share of the recipe's steps that each may take (whoever
+# comes or goes after the first stirs but a few neighbours), as long as more than this share of the bubbles came
+# or went: the last phase evens it out. In a graded pattern, where many do, it does so best at once.
+ROUNDS = (Fraction(1), Fraction(1, 2), Fraction(1, 2))
+ROUNDS_GRADED = (Fraction(2, 3),)
 FEW_CHANGED = 0.01
 # Steps of the last phase, and how often it may be done again.
 STIFF_STEPS, LAST_ROUNDS = 45, 4
+# Whoever comes or goes in the last phases stirs others so far away, in pitches.
+STIRRED = 6.0
 NOT_SYMMETRIC = "The pattern is not symmetric: some of its features are placed by hand."
 
 
@@ -157,19 +166,19 @@ def _settled(
             "No bubble fits into the target region: it is narrower than one pitch everywhere; use a smaller "
             "pitch or a larger region."
         )
-    for number in range(ROUNDS if ground.uniform is not None else ROUNDS_GRADED):
+    for number, share in enumerate(ROUNDS if ground.uniform is not None else ROUNDS_GRADED):
         yield Progress("Packing the bubbles", 0.2 + 0.2 * number)
         local = local_pitch(ground, bubbles)
         settle = relax_steps if packing.integrator == "fire" else integration_steps
-        # Whoever comes or goes after the first round stirs but a few neighbours.
-        steps = max(packing.iterations // (2 if number > 0 else 1), 1)
+        steps = max(int(packing.iterations * share), 1)
         settling = settle(ground, bubbles, filling(ground, bubbles, local), steps, packing.tolerance)
-        bubbles, _ = yield from within(settling, 0.2 + 0.2 * number, 0.4 + 0.2 * number)
+        bubbles, work = yield from within(settling, 0.2 + 0.2 * number, 0.4 + 0.2 * number)
         bubbles, local = _on_planes_again(ground, bubbles, local)
-        bubbles, changed = control(ground, bubbles, local)
+        bubbles, changed = control(ground, bubbles, local, near=work.near)
         if changed <= FEW_CHANGED * len(bubbles):
             break
     yield Progress("Evening out the gaps", 0.8)
+    moving: Bools | None = None
     for number in range(LAST_ROUNDS):
         local = local_pitch(ground, bubbles)
         size, stiffness = filling(ground, bubbles, local), 1.0 + STIFFNESS
@@ -181,19 +190,32 @@ def _settled(
             packing.tolerance,
             stiff_law,
             stiffness,
+            moving,
             stage="Evening out the gaps",
         )
-        bubbles, _ = yield from within(evening, 0.8, 0.95)
+        bubbles, work = yield from within(evening, 0.8, 0.95)
         # What stiff contacts have squeezed through the first row has no place between it and the boundary,
         # and what these have opened another bubble may fit into.
         bubbles, local = _on_planes_again(ground, bubbles, local_pitch(ground, bubbles))
-        more = number + 1 < LAST_ROUNDS
-        bubbles, changed = control(ground, bubbles, local, last=True, filling=more)
+        before, more = bubbles, number + 1 < LAST_ROUNDS
+        bubbles, changed = control(ground, bubbles, local, True, more, moving, work.near)
         if not changed:
             break
+        if ground.uniform is None and ground.symmetry is None:
+            moving = _near_changes(ground, before, bubbles)
     if ground.symmetry is not None:
         bubbles = with_followers(ground, settled_leaders(ground, bubbles))
     return bubbles
+
+
+def _near_changes(ground: Ground, before: Bubbles, after: Bubbles) -> Bools:
+    """Which of the bubbles `after` population control may move, (n,): those near whoever has come or gone."""
+    then, now = (positions(ground.charts, bubbles.spots) for bubbles in (before, after))
+    # Whoever stayed stands exactly where it stood.
+    old, new = (points[:, 0] + np.pi * points[:, 1] + np.e * points[:, 2] for points in (then, now))
+    changed = np.concatenate([now[~np.isin(new, old)], then[~np.isin(old, new)]])
+    changes = cKDTree(changed, balanced_tree=False, compact_nodes=False)
+    return np.asarray(changes.query(now)[0] < STIRRED * local_pitch(ground, after))
 
 
 def _on_planes_again(ground: Ground, bubbles: Bubbles, local: Floats) -> tuple[Bubbles, Floats]:
@@ -294,6 +316,11 @@ def _lattice(ground: Ground, seeds: Spots, directions: Complex) -> Steps[Spots]:
         wanted = partial(led_here, ground, pitch=np.float64(uniform))
         return lay(charts, ground.boundary, uniform, clear, seeds, directions, origin, wanted)
     seeds, directions, _ = symmetric_seeds(ground, seeds, directions, anywhere=False)
+    few = int(charts.region.sheet.max()) < PARTS
+    if charts.region.flat and ground.boundary is not None and ground.uniform is None and few:
+        seeds, directions = with_plane_rows(ground, seeds, directions, None)
+        asked = ground.pitch, seeds, directions, CLEAR_OF_RIM, ground.edge_offset
+        return (yield from grown_in_plane(charts, ground.boundary, *asked))
     closed = np.bincount(charts.region.sheet[charts.region.rim[:, 0]], minlength=len(seeds.row)) == 0
     alike = None if ground.symmetry is None else symmetric_mean(ground.symmetry)
     field = smooth_directions(charts, closed[charts.region.sheet], alike) if closed.any() else None
@@ -305,7 +332,8 @@ def _lattice(ground: Ground, seeds: Spots, directions: Complex) -> Steps[Spots]:
     if ground.symmetry is not None and all_reached(ground, seeds):
         here, own = partial(grown_here, ground), grown_here(ground, seeds)
         seeds, directions = seeds.take(own), directions[own]
-    spots, _ = yield from growing_steps(charts, ground.pitch, seeds, directions, MOST, field, here)
+    bending = ground.uniform is None and field is None
+    spots, _ = yield from growing_steps(charts, ground.pitch, seeds, directions, MOST, field, here, bending)
     return _clear_of_rim(ground, spots)
 
 

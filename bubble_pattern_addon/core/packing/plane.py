@@ -55,7 +55,7 @@ def lay(
         points = points[inside_distance(boundary, points, own) > clear]
         sought = in_plane(charts, points)
         spots, there = search(charts, nearest_signpost(charts, sought, rows[:1]), sought)
-        found.append(_all_found(charts, spots, there, points, pitch))
+        found.append(all_found(charts, spots, there, points, pitch))
     return Spots(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
 
@@ -81,7 +81,7 @@ def _lattice_points(corners: Floats, axes: Floats, origin: Floats, along: Floats
     return origin + flat @ axes
 
 
-def _all_found(charts: Charts, spots: Spots, reached: Bools, points: Floats, pitch: float) -> Spots:
+def all_found(charts: Charts, spots: Spots, reached: Bools, points: Floats, pitch: float) -> Spots:
     """Places of the lattice `points` (n, 3): those `reached`, and the others if they are found from their
     neighbours, because a part of the boundary lay between them and their signpost.
     """

@@ -12,7 +12,7 @@ from ..surface import Charts, Spots, positions, to_frame, walk
 from .bubbles import Bubbles, Ground, joined
 from .crowding import close_pairs, uncrowded
 from .domain import led_here
-from .force import Pairs, find_pairs
+from .force import Pairs, find_pairs, within_reach
 from .orbits import HALO, SEEN, followers_of, leaders_of, on_their_planes, ranked, settled_leaders
 
 # A circle through three bubbles with no other inside is a void when its radius is above this share of the
@@ -47,13 +47,20 @@ def overlap_ratio(pairs: Pairs, distance: Floats, pitch: Floats) -> Floats:
 
 
 def control(
-    ground: Ground, bubbles: Bubbles, pitch: Floats, last: bool = False, filling: bool = True
+    ground: Ground,
+    bubbles: Bubbles,
+    pitch: Floats,
+    last: bool = False,
+    filling: bool = True,
+    among: Bools | None = None,
+    near: Pairs | None = None,
 ) -> tuple[Bubbles, int]:
     """Bubbles without the too crowded ones and with new ones in the voids; and how many came or went.
 
     In a symmetric pattern these are the leaders, and whoever comes or goes does so with its followers. At
     the `last` only those that are pressed out go, and only voids that another bubble fits into are filled,
-    if there is to be any `filling`.
+    if there is to be any `filling`; only between bubbles `among` (n,) of these, if that is given.
+    The pairs that are close enough are among those `near`, if these are known.
     """
     spots, n, m = bubbles.spots, len(bubbles), bubbles.fixed
     points, row, owner = positions(ground.charts, spots), spots.row, np.arange(n)
@@ -62,7 +69,10 @@ def control(
         points, row = np.concatenate([points, followers.points]), np.concatenate([row, followers.row])
         owner = np.concatenate([owner, followers.leader])
     everywhere = pitch[owner]
-    pairs = find_pairs(ground.charts, points, row, everywhere, 0.0)
+    if near is None:
+        pairs = find_pairs(ground.charts, points, row, everywhere, 0.0)
+    else:
+        pairs = within_reach(near, points, 0.0)
     distance = np.linalg.norm(points[pairs.first] - points[pairs.second], axis=1)
     ratio = overlap_ratio(pairs, distance, everywhere)
     gone = _pressed_out(ground, bubbles, pitch, pairs)
@@ -71,6 +81,7 @@ def control(
         gone[m:] |= _too_crowded(pairs, distance / pairs.stable, ratio[:n], owner, m, most)
     lonely, least = np.flatnonzero(ratio < LONELY), LAST_VOID if last else VOID
     lonely = lonely[led_here(ground, points[lonely], everywhere[lonely], SEEN)] if filling else lonely[:0]
+    lonely = lonely if among is None else lonely[among[owner[lonely]]]
     added = _voids(ground, points, row, everywhere, lonely, pairs, least)
     if not gone.any() and not len(added.row):
         return bubbles, 0
@@ -298,8 +309,8 @@ def _circumcircles(corners: Floats) -> tuple[Floats, Floats]:
 def _empty(ground: Ground, spots: Spots, at: Floats, points: Floats, row: Ints, radius: Floats) -> Bools:
     """Whether no bubble of the same side of the surface is within `radius` of the places."""
     reach = float(radius.max(initial=0.0))
-    places = cKDTree(at)
-    near = places.sparse_distance_matrix(cKDTree(points), reach, output_type="ndarray")
+    places, others = (cKDTree(each, balanced_tree=False, compact_nodes=False) for each in (at, points))
+    near = places.sparse_distance_matrix(others, reach, output_type="ndarray")
     place, other, distance = near["i"], near["j"], near["v"]
     taken = (distance <= radius[place]) & ground.charts.region.same_side(spots.row[place], row[other])
     return np.bincount(place[taken], minlength=len(at)) == 0

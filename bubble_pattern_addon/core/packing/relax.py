@@ -104,6 +104,8 @@ def relax_steps(
     if moving is not None:
         everyone[: len(bubbles)] &= moving
     links = links_of(swarm, np.flatnonzero(everyone))
+    # Bubbles of a graded start move much, and listing their pairs anew costs more than a step of theirs.
+    beyond = SKIN / 2 if ground.uniform is not None else UNSEEN
     looked_at_all, done = True, 0
     while done < iterations:
         pull = pull_on(swarm, links, law)
@@ -117,7 +119,7 @@ def relax_steps(
         wave = _with_neighbours(swarm, stirred) & everyone
         if len(everyone) < FEW or wave.sum() > NEARLY_ALL * everyone.sum():
             wave = everyone
-        anew = list_anew(swarm, links.active, SKIN / 2)
+        anew = list_anew(swarm, links.active, beyond)
         if anew or not np.array_equal(np.flatnonzero(wave), links.active):
             land(swarm, links.active)
             fire.velocity[~wave] = 0

@@ -24,7 +24,9 @@ from .orbits import HALO, Followers, followers_of, held
 SKIN = 0.16
 # Pairs of bubbles of different sizes take long to find: they are listed out to this reserve as well, which
 # holds for several of the shorter lists: until a bubble has moved so far, in pitches.
-WIDE_SKIN, WIDE_MOVED = 0.7, 0.4
+WIDE_SKIN, WIDE_MOVED = 0.9, 0.5
+# Where a smaller share of the bubbles has moved, listing their pairs alone is quicker than all anew.
+RENEWABLE = 0.3
 # Where fewer bubbles are at work, telling some apart from the others costs more than it spares.
 FEW = 3000
 # How far bubbles may move between two landings, in pitches: AFLOAT at first, then so far that by what they
@@ -36,11 +38,14 @@ OFF = 0.01
 
 @dataclass
 class Work:
-    """What a relaxation has cost: force evaluations, and the bubbles and pairs these went over."""
+    """What a relaxation has cost: force evaluations, and the bubbles and pairs these went over; and from its
+    wide list, where it has one, the pairs `near` enough at its end to feel each other, among others.
+    """
 
     evaluations: int = 0
     bubbles: int = 0
     pairs: int = 0
+    near: Pairs | None = None
 
 
 @dataclass
@@ -125,13 +130,27 @@ def _pairs_now(swarm: Swarm) -> Pairs:
     if swarm.ground.uniform is not None:
         return find_pairs(charts, points, row, pitch, SKIN)
     if swarm.wide is not None:
-        away = points - swarm.wide[1]
-        shift = np.einsum("nc,nc->n", away, away) / pitch**2
-        if shift.max(initial=0.0) > WIDE_MOVED**2:
-            swarm.wide = None
+        _renew_wide(swarm)
     if swarm.wide is None:
         swarm.wide = find_pairs(charts, points, row, pitch, WIDE_SKIN), points.copy()
     return within_reach(swarm.wide[0], points, SKIN)
+
+
+def _renew_wide(swarm: Swarm) -> None:
+    """Bring the wide list up to date, or drop it, where bubbles have moved farther than it allows for."""
+    assert swarm.wide is not None
+    pairs, listed_at = swarm.wide
+    charts, points, pitch = swarm.ground.charts, swarm.points, swarm.pitch
+    away = points - listed_at
+    shift = np.einsum("nc,nc->n", away, away) / pitch**2
+    if shift.max(initial=0.0) <= WIDE_MOVED**2:
+        return
+    stale = np.flatnonzero(shift > (WIDE_MOVED / 2) ** 2)
+    if len(stale) > RENEWABLE * len(points):
+        swarm.wide = None
+        return
+    listed_at[stale] = points[stale]
+    swarm.wide = renewed_pairs(pairs, stale, charts, points, swarm.row, pitch, WIDE_SKIN), listed_at
 
 
 def follow(swarm: Swarm) -> None:
@@ -156,6 +175,9 @@ def bubbles_of(swarm: Swarm) -> Bubbles:
     """The bubbles where the swarm has them."""
     n = len(swarm.bubbles)
     _walk_there(swarm, np.flatnonzero((swarm.points[:n] != swarm.landed[:n]).any(axis=1)))
+    if swarm.wide is not None and swarm.followers is None:
+        _renew_wide(swarm)
+        swarm.work.near = None if swarm.wide is None else swarm.wide[0]
     return Bubbles(Spots(swarm.row[:n], swarm.bary[:n]), swarm.bubbles.fixed)
 
 
@@ -285,7 +307,7 @@ def list_anew(swarm: Swarm, active: Ints, beyond: float) -> bool:
         moved[len(swarm.bubbles) :] = moved[swarm.followers.leader]
     stale = np.flatnonzero(moved)
     charts, points, row, pitch = swarm.ground.charts, swarm.points, swarm.row, swarm.pitch
-    if len(stale) > 0.3 * len(points) or len(points) < FEW:
+    if len(stale) > RENEWABLE * len(points) or len(points) < FEW:
         swarm.pairs = _pairs_now(swarm)
         swarm.listed_at, swarm.strayed = points.copy(), 0.0
     else:
