@@ -7,7 +7,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from ..isometries import Isometries, depth
-from ..mesh import Bools, Floats, Ints
+from ..mesh import Bools, Floats
 from ..surface import Spots, positions
 from .bubbles import Ground
 

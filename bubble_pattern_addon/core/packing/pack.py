@@ -288,8 +288,8 @@ def _lattice(ground: Ground, seeds: Spots, directions: Complex) -> Steps[Spots]:
     if uniform is not None and ground.boundary is not None and fills_its_box(charts, uniform):
         seeds, directions, origin = symmetric_seeds(ground, seeds, directions, anywhere=True)
         clear = CLEAR_OF_RIM * uniform + ground.edge_offset
-        wanted = partial(led_here, ground, pitch=np.float64(uniform))
-        return lay(charts, ground.boundary, uniform, clear, seeds, directions, origin, wanted)
+        inside = partial(led_here, ground, pitch=np.float64(uniform))
+        return lay(charts, ground.boundary, uniform, clear, seeds, directions, origin, inside)
     seeds, directions, _ = symmetric_seeds(ground, seeds, directions, anywhere=False)
     closed = np.bincount(charts.region.sheet[charts.region.rim[:, 0]], minlength=len(seeds.row)) == 0
     alike = None if ground.symmetry is None else symmetric_mean(ground.symmetry)
@@ -297,12 +297,12 @@ def _lattice(ground: Ground, seeds: Spots, directions: Complex) -> Steps[Spots]:
     if field is not None:
         field = rather_along(ground, field)
         directions = np.where(closed, field[seeds.row] ** (1 / 6), directions)
-    wanted = None
     seeds, directions = with_plane_rows(ground, seeds, directions, field)
+    here = None
     if ground.symmetry is not None and all_reached(ground, seeds):
-        wanted, own = partial(grown_here, ground), grown_here(ground, seeds)
+        here, own = partial(grown_here, ground), grown_here(ground, seeds)
         seeds, directions = seeds.take(own), directions[own]
-    spots, _ = yield from growing_steps(charts, ground.pitch, seeds, directions, MOST, field, wanted)
+    spots, _ = yield from growing_steps(charts, ground.pitch, seeds, directions, MOST, field, here)
     return _clear_of_rim(ground, spots)
 
 
