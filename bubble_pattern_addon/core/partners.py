@@ -35,15 +35,9 @@ class Kin:
 
 def kin_of(pattern: Pattern) -> Kin | None:
     """Who is whose partner; None without a symmetry, or where a partner is missing."""
-    group, partners = pattern.isometries, pattern.partners
-    if group is None or partners is None or not len(pattern):
+    group, row, n = pattern.isometries, partner_rows(pattern), len(pattern)
+    if group is None or row is None:
         return None
-    order = np.argsort(pattern.ids)
-    place = np.searchsorted(pattern.ids, partners, sorter=order)
-    row = order[np.minimum(place, len(order) - 1)]
-    if not np.array_equal(pattern.ids[row], partners):
-        return None
-    n = len(pattern)
     level = np.round(depth(group, pattern.position) / (SAME_DEPTH * pattern.pitch))
     rank = np.lexsort((np.arange(n), -level)).argsort()
     lead = row[np.arange(n), rank[row].argmin(axis=1)]
@@ -53,6 +47,18 @@ def kin_of(pattern: Pattern) -> Kin | None:
     sign = np.where(np.linalg.det(group.turns) < 0, -1, 1)[number]
     mirrors = 1 + np.arange(len(group.planes))
     return Kin(lead, turn, sign, (row[:, mirrors] == np.arange(n)[:, None]).T, group.planes)
+
+
+def partner_rows(pattern: Pattern) -> Ints | None:
+    """Rows (n, k) of the features to which the isometries take each one; None without a symmetry, or where
+    one is missing.
+    """
+    if pattern.partners is None or not len(pattern):
+        return None
+    order = np.argsort(pattern.ids)
+    place = np.searchsorted(pattern.ids, pattern.partners, sorter=order)
+    row = order[np.minimum(place, len(order) - 1)]
+    return row if np.array_equal(pattern.ids[row], pattern.partners) else None
 
 
 def found_partners(group: Isometries, position: Floats, pitch: Floats) -> Ints | None:
