@@ -9,13 +9,18 @@ import numpy as np
 from mathutils import Matrix
 
 from ..core.feature_recipe import SIZES
+from ..core.isometries import Isometries, isometries
 from ..core.mesh import Floats, Ints, Mesh
 from ..core.metric import Places
+from ..core.partners import found_partners
 from ..core.pattern import Pattern, aimed, all_bubbles, split, take
 from .attributes import read_values, write_values
 from .point_marks import mark_pins, remember
 from .preview_nodes import show_shape
 from .reading import Base
+
+# The custom property of a pattern's mesh that says which symmetry it has.
+SYMMETRY = "bubble_pattern_symmetry"
 
 
 def new_pattern_object(base: bpy.types.Object) -> bpy.types.Object:
@@ -44,12 +49,35 @@ def write_pattern(obj: bpy.types.Object, pattern: Pattern, base_object: bpy.type
     write_values(mesh, "tangent", 'POINT', 'FLOAT_VECTOR', bubbles.tangent)
     write_values(mesh, "triangle", 'POINT', 'INT', bubbles.places.triangle)
     write_values(mesh, "barycentric", 'POINT', 'FLOAT_VECTOR', bubbles.places.barycentric)
+    write_symmetry(mesh, bubbles.isometries)
     write_sizes(obj, pattern)
     mark_pins(obj, bubbles.position, bubbles.pitch)
     remember(obj, bubbles.position, bubbles.ids)
     mesh.update()
     obj.matrix_parent_inverse = base_object.matrix_world.inverted_safe()
     obj.matrix_basis = Matrix(base.frame.tolist())
+
+
+def write_symmetry(mesh: bpy.types.Mesh, group: Isometries | None) -> None:
+    """Note on the points which symmetry they have, for a later shaping to keep it."""
+    if group is not None:
+        mesh[SYMMETRY] = {
+            "word": group.word,
+            "centre": group.centre.tolist(),
+            "axes": group.axes.ravel().tolist(),
+        }
+
+
+def read_symmetry(mesh: bpy.types.Mesh, position: Floats, pitch: Floats) -> dict[str, Any]:
+    """What the pattern of points at `position` (n, 3) says of its symmetry; nothing where it has none, or has
+    lost it to work by hand.
+    """
+    if SYMMETRY not in mesh:
+        return {}
+    noted = mesh[SYMMETRY]
+    group = isometries(noted["word"], np.array(noted["centre"]), np.array(noted["axes"]).reshape(3, 3))
+    partners = found_partners(group, position, pitch)
+    return {} if partners is None else {"symmetry": group.word, "isometries": group, "partners": partners}
 
 
 def fresh_mesh(obj: bpy.types.Object) -> bpy.types.Mesh:
@@ -137,16 +165,21 @@ def read_pattern(obj: bpy.types.Object, mesh: Mesh) -> Pattern:
         for name in ("axis", "heading")
     }
     sizes = {name: values(name, "value", np.float32).astype(np.float64) for name in SIZES if name in points}
+    pitch = values("pitch", "value", np.float32).astype(np.float64)
+    symmetry = read_symmetry(obj.data, position, pitch)
+    if symmetry:
+        symmetry["partners"] = ids[symmetry["partners"]]
     bubbles = Pattern(
         places=Places(position, triangle, barycentric),
         normal=unit(values("normal", "vector", np.float32, 3).astype(np.float64)),
         tangent=unit(values("tangent", "vector", np.float32, 3).astype(np.float64)),
-        pitch=values("pitch", "value", np.float32).astype(np.float64),
+        pitch=pitch,
         diameter=values("diameter", "value", np.float32).astype(np.float64),
         row=values("row", "value", np.int32).astype(np.int64),
         wished=values("wished", "value", np.float32).astype(np.float64) if known else None,
         bubble=None if np.array_equal(ids, np.arange(len(ids))) else ids,
         **ways,
+        **symmetry,
         sizes=sizes,
     )
     return split(bubbles, bubbles.diameter > 0)

@@ -28,16 +28,24 @@ ASTRAY = 2.0
 
 
 def averaged(
-    shaping: Shaping, base: Floats, links: Links, position: Floats, pitch: Floats
+    shaping: Shaping,
+    base: Floats,
+    links: Links,
+    position: Floats,
+    pitch: Floats,
+    partners: Ints | None = None,
 ) -> tuple[Floats, Bools]:
     """Diameters (n,) from the shaping's seeds, and which features they reach, (n,).
 
     base: (n,) diameters of the features that no seed reaches over links, as on another part of the region;
-    they keep them. The iteration starts from them.
+    they keep them. The iteration starts from them. partners: (n, k) rows of the features that are each one's
+    images, which a seed fixes as well
 
     Raises RecipeError where a seed is off the pattern or two fix the same feature.
     """
     fixed, sizes = seeded(shaping.seeds, position, pitch)
+    if partners is not None:
+        fixed, sizes = _with_partners(fixed, sizes, partners)
     weights = weight_matrix(links, len(base))
     _, cluster = connected_components(weights, directed=False)
     reached = np.isin(cluster, cluster[fixed])
@@ -68,6 +76,13 @@ def seeded(seeds: tuple[Seed, ...], position: Floats, pitch: Floats) -> tuple[In
             f"[shaping] seeds, seeds {one} and {other} fix the same feature: leave one of them out"
         )
     return feature.astype(np.int64), np.array([seed.diameter for seed in seeds])
+
+
+def _with_partners(fixed: Ints, sizes: Floats, partners: Ints) -> tuple[Ints, Floats]:
+    """The features `fixed` (k,) and their partners, and their `sizes`; those with seeds have these."""
+    everyone = np.concatenate([fixed, partners[fixed].ravel()])
+    found, first = np.unique(everyone, return_index=True)
+    return found, np.concatenate([sizes, np.repeat(sizes, partners.shape[1])])[first]
 
 
 def weight_matrix(links: Links, n: int) -> csr_array:

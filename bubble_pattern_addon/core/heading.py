@@ -14,6 +14,7 @@ from .links import Links
 from .mesh import Floats
 from .metric import Described, Field
 from .painted import painted
+from .partners import Kin, alike, along_or_square, kin_of, own_image
 from .pattern import Pattern
 from .profile import outlines, signed_area
 from .region import Region
@@ -28,6 +29,8 @@ EVEN_BEND = 2e-3
 SHARP_TURN = np.radians(30.0)
 STEP = 2.0
 BESIDE = 0.75
+# Turns for which the recipe says where to head in space.
+GIVEN = ("fixed", "towards", "around", "attribute")
 # what a size must be above, and at most
 RANGES = {
     "depth": (0.0, np.inf),
@@ -61,9 +64,28 @@ def headed(bubbles: Pattern, links: Links, feature: Feature, surroundings: Surro
     if feature.turn != "row":
         wished = _directions(bubbles, axis, heading, links, feature, surroundings)
         heading = square_to(axis, wished, heading)
-    heading = turned(axis, heading, angle)
+    kin = kin_of(bubbles)
+    heading = (
+        turned(axis, heading, angle) if kin is None else _turned_alike(kin, feature, axis, heading, angle)
+    )
     axis_given = None if feature.axis == 0 else axis
     return replace(bubbles, axis=axis_given, heading=heading, sizes=sizes, share=share)
+
+
+def _turned_alike(kin: Kin, feature: Feature, axis: Floats, heading: Floats, angle: Floats) -> Floats:
+    """The headings turned by the angle, (n,) or (1,), so that partners are each other's images: one turned
+    clockwise where the other is turned counter-clockwise.
+
+    A direction that the designer gives in space is kept, symmetric or not.
+    """
+    own = own_image(kin, heading)
+    if feature.turn not in GIVEN:
+        heading, own = square_to(axis, alike(kin, along_or_square(kin, heading)), heading), np.ones_like(own)
+    angle = kin.sign * np.broadcast_to(angle, len(axis))[kin.lead]
+    heading = along_or_square(kin, turned(axis, heading, angle), own)
+    return (
+        square_to(axis, heading) if feature.turn in GIVEN else square_to(axis, alike(kin, heading), heading)
+    )
 
 
 def _laid(described: Described, name: str, bubbles: Pattern, surroundings: Surroundings) -> Floats:

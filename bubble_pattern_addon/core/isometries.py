@@ -124,6 +124,17 @@ def isometries(word: str, centre: Floats, axes: Floats | None = None) -> Isometr
     return Isometries(word, turns, centre, np.arange(1, len(mirrors) + 1), planes, -1, axes)
 
 
+def same_isometries(groups: Sequence[Isometries | None]) -> Isometries | None:
+    """The group that all are, or None."""
+    first = groups[0]
+    for other in groups[1:]:
+        if first is None or other is None or first.turns.shape != other.turns.shape:
+            return None
+        if not (np.allclose(first.turns, other.turns) and np.allclose(first.centre, other.centre)):
+            return None
+    return first
+
+
 def _turn(axis: int, angle: float) -> Floats:
     turn = np.eye(3)
     one, two = (axis + 1) % 3, (axis + 2) % 3

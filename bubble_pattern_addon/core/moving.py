@@ -10,7 +10,7 @@ import numpy as np
 
 from .blending import FaceSet
 from .feature_recipe import Feature
-from .isometries import OFF
+from .isometries import OFF, Isometries, isometries
 from .keep_out import frame_along
 from .mesh import Floats
 from .metric import Described, Places
@@ -82,12 +82,20 @@ def moved_pattern(pattern: Pattern, matrix: Floats, factor: float = 1.0) -> Patt
         wished=None if pattern.wished is None else pattern.wished * factor,
         axis=None if pattern.axis is None else pattern.axis @ turn,
         heading=None if pattern.heading is None else pattern.heading @ turn,
+        isometries=None if pattern.isometries is None else _moved_group(pattern.isometries, matrix, factor),
         sizes={
             name: values * factor if name in ("depth", "height") else values
             for name, values in pattern.sizes.items()
         },
         dropped=None if pattern.dropped is None else moved_pattern(pattern.dropped, matrix, factor),
     )
+
+
+def _moved_group(group: Isometries, matrix: Floats, factor: float) -> Isometries:
+    """The isometries that move what has been moved as these moved it before."""
+    turn = matrix[:3, :3]
+    centre = (turn @ group.centre + matrix[:3, 3]) * factor
+    return isometries(group.word, centre, group.axes @ turn.T)
 
 
 def moved_feature(feature: Feature, matrix: Floats, region: Region) -> Feature:

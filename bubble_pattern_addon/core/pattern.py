@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from .isometries import Isometries, same_isometries
 from .mesh import Bools, Floats, Ints
 from .metric import Places, end_to_end
 
@@ -34,6 +35,7 @@ class Pattern:
     notes: what a designer should know of the pattern, one sentence each
     packing_notes: those of them that are about the packing, which stay when features are shaped anew
     symmetry: the recipe's word for the symmetry that the bubbles have, None without one
+    isometries: of that symmetry, None where nothing is known of them
     partners: (n, k) for each of its isometries, the first of which leaves everything where it is, the id of
     the bubble to which it takes this one: of its own where it is on the plane or axis
     axis: (n, 3) unit vectors along which the features stand, None for the normals
@@ -54,6 +56,7 @@ class Pattern:
     notes: tuple[str, ...] = ()
     packing_notes: tuple[str, ...] = ()
     symmetry: str | None = None
+    isometries: Isometries | None = None
     partners: Ints | None = None
     axis: Floats | None = None
     heading: Floats | None = None
@@ -154,6 +157,7 @@ def _end_to_end(parts: Sequence[Pattern]) -> Pattern:
         bubble=column("ids"),
         packing_notes=tuple(dict.fromkeys(note for part in parts for note in part.packing_notes)),
         symmetry=parts[0].symmetry if symmetric else None,
+        isometries=same_isometries([part.isometries for part in parts]) if symmetric else None,
         partners=column("partners") if symmetric else None,
         axis=_given(parts, "axis", lambda part: part.normal),
         heading=_given(parts, "heading", lambda part: part.tangent),

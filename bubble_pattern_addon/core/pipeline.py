@@ -9,11 +9,13 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
 from .errors import RegionError
+from .heading import square_to
 from .links import Links, find_links
 from .mesh import Bools, Floats, Ints
 from .metric import Bound, Constant, Field
 from .packing.bubbles import Bubbles, Ground
 from .packing.pack import local_pitch, pack_steps
+from .partners import alike, along_or_square, kin_of
 from .pattern import Pattern
 from .progress import Progress, Steps
 from .recipe import Packing, Recipe, rounded
@@ -79,9 +81,16 @@ def laid(
         row=_rows(links, first),
         packing_notes=(*region.notes, *ground.notes),
         symmetry=None if ground.symmetry is None else ground.symmetry.group.word,
+        isometries=None if ground.symmetry is None else ground.symmetry.group,
         partners=bubbles.partners,
         bubble=ids,
     )
+    kin = kin_of(packed)
+    if kin is not None:
+        tangent = square_to(
+            normal, alike(kin, along_or_square(kin, packed.tangent, six=True)), packed.tangent
+        )
+        packed = replace(packed, tangent=tangent)
     return shaped(packed, links, region, recipe, replace(surroundings, region=region))
 
 

@@ -15,6 +15,7 @@ from .links import Links, links_of
 from .mesh import Floats
 from .metric import Described, Field
 from .nominal import nominal_sizes
+from .partners import partner_rows
 from .pattern import Pattern, all_bubbles
 from .recipe import Recipe, Shaping
 from .region import Region
@@ -102,7 +103,7 @@ def diameters(
         raise RecipeError("The diameter must be a positive length everywhere in the target region: raise it.")
     if not shaping.seeds or not len(bubbles):
         return wished, ()
-    wished, reached = averaged(shaping, wished, links, bubbles.position, pitch)
+    wished, reached = averaged(shaping, wished, links, bubbles.position, pitch, partner_rows(bubbles))
     alone = int((~reached).sum())
     if not alone:
         return wished, ()

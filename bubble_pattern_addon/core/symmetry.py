@@ -108,7 +108,7 @@ def places_near(finder: Finder, points: Floats, normals: Floats, within: Floats)
 
 
 def rows_near(finder: Finder, points: Floats, normals: Floats) -> Ints:
-    """Triangles (n,) near to `points` (n, 3) that face as `normals` (n, 3) do: enough to tell sheets apart."""
+    """Triangles (n,) near to `points` (n, 3) that face as `normals` (n, 3) do, to tell sheets apart."""
     if finder.charts.region.single_sheet:
         return np.zeros(len(points), dtype=np.int64)
     return finder.spots.row[finder.tree.query(np.concatenate([points, finder.reach * normals], axis=1))[1]]

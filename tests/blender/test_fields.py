@@ -21,6 +21,7 @@ from bubble_pattern_addon.blender import (  # noqa: E402
     generation,
     packing_panel,
     panels,
+    pattern_object,
     properties,
     settings_recipe,
     shaping_panel,
@@ -387,6 +388,29 @@ def test_a_symmetric_pattern_is_laid_from_the_settings() -> None:
     away = np.linalg.norm(where[:, None] * [-1, 1, 1] - where[None], axis=2).min(axis=1)
     assert len(where) > 50
     assert away.max() < 1e-3 * pattern.bubble_pattern.pitch
+
+
+def test_features_of_a_symmetric_pattern_stand_symmetrically_after_another_shaping() -> None:
+    pattern = laid()
+    settings = pattern.bubble_pattern
+    settings.symmetry = 'X'
+    settings.profile, settings.turn, settings.angle = 'SLOT', 'RANDOM', 0.3
+    where = local(pattern)
+    near = np.linalg.norm(where[:, None] * [-1, 1, 1] - where[None], axis=2).argmin(axis=1)
+    along = np.array([item.vector for item in pattern.data.attributes["heading"].data])
+    image = along[near] * [-1, 1, 1]
+    off = np.minimum(np.linalg.norm(along - image, axis=1), np.linalg.norm(along + image, axis=1))
+    assert len(np.unique(np.round(along[:, 0], 3))) > 20
+    assert off.max() < 1e-4
+    # read without one of the points, it has lost its symmetry: nothing to keep
+    recipe = settings_recipe.recipe_of(settings)
+    mesh = generation.read_source(settings.base, settings.region, bpy.context, recipe).base.mesh
+    assert pattern_object.read_pattern(pattern, mesh).symmetry == "x"
+    aside = int(np.argmax(where[:, 0]))
+    pattern.data.attributes["pitch"].data[aside].value = 0.0
+    read = pattern_object.read_pattern(pattern, mesh)
+    assert read.isometries is None
+    assert read.partners is None
 
 
 KIND_NAMES = ('LINEAR', 'RADIAL', 'EDGE', 'DISTANCE', 'ATTRIBUTE', 'IMAGE')

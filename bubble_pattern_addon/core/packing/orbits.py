@@ -78,7 +78,7 @@ def leaders_of(ground: Ground, candidates: Spots, rank: Ints) -> Ints:
 
     rank: (n,) of two orbits in each other's way the one with the higher rank gives way
     """
-    symmetry, charts = _symmetry(ground), ground.charts
+    charts = ground.charts
     points, pitch = positions(charts, candidates), ground.pitch(candidates)
     inside = np.flatnonzero(led_here(ground, points, pitch))
     everyone = followers_of(ground, candidates.take(inside), pitch[inside])
@@ -168,7 +168,7 @@ def followers_of(ground: Ground, spots: Spots, pitch: Floats, reach: float | Non
 
 
 def _turned_normals(ground: Ground, spots: Spots, leader: Ints, number: Ints) -> Floats:
-    """Which way the surface faces, (h, 3), at the images of `leader` (h,) under the isometries `number` (h,)."""
+    """Which way the surface faces, (h, 3), at the image of each `leader` (h,) under the isometry `number`."""
     region = ground.charts.region
     return np.einsum("nab,nb->na", _symmetry(ground).group.turns[number], region.normals[spots.row[leader]])
 

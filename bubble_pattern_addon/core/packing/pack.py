@@ -66,8 +66,8 @@ TURNS = (0.0, 15.0, 30.0, 45.0)
 # .95 itself, by how far its gaps are evened out.
 CRAMPED = 1.04
 # Rounds of relaxation and population control, by the share of the recipe's steps that each may take (whoever
-# comes or goes after the first stirs but a few neighbours), as long as more than this share of the bubbles came
-# or went: the last phase evens it out. In a graded pattern, where many do, it does so best at once.
+# comes or goes after the first stirs but a few neighbours), as long as more than FEW_CHANGED of the bubbles
+# came or went: the last phase evens it out. In a graded pattern, where many do, it does so best at once.
 ROUNDS = (Fraction(1), Fraction(1, 2), Fraction(1, 2))
 ROUNDS_GRADED = (Fraction(2, 3),)
 FEW_CHANGED = 0.01
@@ -313,8 +313,8 @@ def _lattice(ground: Ground, seeds: Spots, directions: Complex) -> Steps[Spots]:
     if uniform is not None and ground.boundary is not None and fills_its_box(charts, uniform):
         seeds, directions, origin = symmetric_seeds(ground, seeds, directions, anywhere=True)
         clear = CLEAR_OF_RIM * uniform + ground.edge_offset
-        wanted = partial(led_here, ground, pitch=np.float64(uniform))
-        return lay(charts, ground.boundary, uniform, clear, seeds, directions, origin, wanted)
+        inside = partial(led_here, ground, pitch=np.float64(uniform))
+        return lay(charts, ground.boundary, uniform, clear, seeds, directions, origin, inside)
     seeds, directions, _ = symmetric_seeds(ground, seeds, directions, anywhere=False)
     few = int(charts.region.sheet.max()) < PARTS
     if charts.region.flat and ground.boundary is not None and ground.uniform is None and few:
