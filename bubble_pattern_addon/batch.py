@@ -30,6 +30,7 @@ from .core.field_tables import Wanted
 from .core.files import LoadedBase, load_base, load_solids, output_folder, write_mesh
 from .core.keep_out import region_with_keep_outs
 from .core.mesh import Bools, Floats, Mesh
+from .core.part import Part
 from .core.pattern import Pattern
 from .core.pipeline import pattern_steps
 from .core.progress import Progress, Result, Steps, drive, within
@@ -40,7 +41,7 @@ from .core.recipe_units import load_fitted_recipe
 from .core.region import Region
 from .core.selection import select, sub_regions
 from .core.sides import check_one_side
-from .core.solid import Part, part_steps
+from .core.solid import part_steps
 from .core.solving import solving_steps
 from .core.soundness import sound_base
 from .core.surroundings import Surroundings

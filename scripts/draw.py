@@ -19,7 +19,7 @@ from bubble_pattern_addon.core.distance import boundary_distance
 from bubble_pattern_addon.core.mesh import Floats, Ints
 from bubble_pattern_addon.core.neighbours import neighbours
 from bubble_pattern_addon.core.quality import Quality, measure_points
-from scripts.benchmark import pack
+from scripts.benchmark_packing import pack
 from scripts.shapes import SHAPES
 
 matplotlib.use("Agg")

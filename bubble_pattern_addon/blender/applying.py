@@ -7,11 +7,13 @@ import bpy
 from ..core.errors import RegionError
 from ..core.feature_recipe import Feature
 from ..core.metric import end_to_end
+from ..core.part import Part
 from ..core.pattern import Pattern, joined
+from ..core.plan import Plan
 from ..core.progress import Progress, Steps
 from ..core.several import Layer, layered_steps
 from ..core.sides import check_one_side
-from ..core.solid import Part, Plan, cutting_seconds
+from ..core.solid import cutting_seconds
 from .feature_objects import stamp_of
 from .generation import renewing_steps, show_part
 from .hand_state import check_settled

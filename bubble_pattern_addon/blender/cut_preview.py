@@ -53,7 +53,7 @@ def show_cut(obj: bpy.types.Object, context: bpy.types.Context) -> None:
 
     Raises PatternError where there is nothing to cut, or Blender's modifier does not cut it.
     """
-    from ..core.solid import plan_steps
+    from ..core.plan import plan_steps
     from .feature_objects import stamp_of
     from .hand_state import check_settled
     from .pattern_object import read_pattern

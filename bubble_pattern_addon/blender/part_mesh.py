@@ -36,7 +36,7 @@ from .reading import Base, transformed
 from .vertex_groups import write_groups
 
 if TYPE_CHECKING:
-    from ..core.solid import Part
+    from ..core.part import Part
 
 # Facets of a wall that meet at a larger angle are sharp: a floor, a chamfer, a profile's corner. In degrees.
 CREASE = 40.0

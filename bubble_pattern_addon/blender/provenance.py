@@ -26,7 +26,7 @@ from .reading import Base
 from .vertex_groups import VertexGroup, read_groups
 
 if TYPE_CHECKING:
-    from ..core.solid import Part
+    from ..core.part import Part
 
 # A corner this near to a side of its source triangle, as a barycentric coordinate, lies on it.
 ON_SIDE = 1e-6

@@ -13,12 +13,12 @@ import numpy as np
 
 from .isometries import OFF
 from .mesh import Floats, Ints
+from .part import Part
 from .pattern import Pattern, aimed
 from .quality import Quality, measure, min_margin, min_web, open_area
 from .recipe import Recipe
 from .region import Region
 from .results_report import results_report
-from .solid import Part
 from .solving import Solved
 
 COLUMNS = ("id", "x", "y", "z", "nx", "ny", "nz", "diameter", "pitch", "row")

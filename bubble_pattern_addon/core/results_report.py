@@ -6,12 +6,12 @@ from typing import Any
 
 from .density import mass
 from .floors import Broken
+from .part import Part
 from .pattern import Pattern
 from .quality import Quality
 from .recipe import Recipe
 from .region import Region
 from .results import Web, results_of, words_of
-from .solid import Part
 from .solving import Solved
 
 

@@ -9,9 +9,11 @@ import numpy as np
 
 from .feature_recipe import Feature
 from .mesh import Mesh
+from .part import Part
 from .pattern import Pattern
+from .plan import Plan
 from .progress import Steps, within
-from .solid import Part, Plan, part_steps
+from .solid import part_steps
 
 
 @dataclass(frozen=True)

@@ -213,21 +213,21 @@ def _walk_straight(charts: Charts, start: Spots, steps: Complex, carried: Comple
             ended = out[stopped]
             row[ended], bary[ended], left[ended] = at[stopped], here[stopped], step[stopped]
             carried[ended] = product(carried[ended], turned[stopped])
-            going = ~stopped
-            out, at, here, step, turned = out[going], at[going], here[going], step[going], turned[going]
-            corner, beyond, entry = corner[going], beyond[going], entry[going]
+            on = np.flatnonzero(~stopped)
+            out, at, here, step, turned = out[on], at[on], here[on], step[on], turned[on]
+            corner, beyond, entry = corner[on], beyond[on], entry[on]
         turn = charts.turns[at, corner]
         here, at = _across(here, corner, entry), beyond
         step, turned = product(step, turn), product(turned, turn)
         rate = _rates(charts, at, step)
         there = here + rate
         outside = _outside(there)
-        inside, going = np.flatnonzero(~outside), np.flatnonzero(outside)
-        ended = out.take(inside)
-        row[ended], bary[ended] = at.take(inside), there.take(inside, axis=0)
-        carried[ended] = product(carried[ended], turned.take(inside))
-        out, at, step, turned = (values.take(going) for values in (out, at, step, turned))
-        here, rate, there = (values.take(going, axis=0) for values in (here, rate, there))
+        inside, on = np.flatnonzero(~outside), np.flatnonzero(outside)
+        ended = out[inside]
+        row[ended], bary[ended] = at[inside], there.take(inside, axis=0)
+        carried[ended] = product(carried[ended], turned[inside])
+        out, at, step, turned = out[on], at[on], step[on], turned[on]
+        here, rate, there = here.take(on, axis=0), rate.take(on, axis=0), there.take(on, axis=0)
     return Walk(Spots(row, bary), carried, left)
 
 

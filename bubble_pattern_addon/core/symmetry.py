@@ -20,6 +20,8 @@ Lengths = Callable[[Spots], Floats]
 TOLERANCE = 0.02
 # A metric is symmetric when its values at mirrored places differ by less than this share.
 METRIC_TOLERANCE = 0.01
+# A place that is this share of it from a point is near enough to tell.
+NEAR_ENOUGH = 0.1
 # About so many places of the region are mirrored to find out.
 SAMPLES = 3000
 # So few show that most other symmetries are out of the question.
@@ -77,7 +79,7 @@ def make_finder(charts: Charts, reach: float) -> Finder:
     bary[np.arange(len(owner)), sides.argmin(axis=1)[owner]] = share
     spots = Spots(owner, bary)
     where = np.concatenate([positions(charts, spots), reach * charts.region.normals[owner]], axis=1)
-    return Finder(charts, spots, cKDTree(where), reach)
+    return Finder(charts, spots, cKDTree(where, balanced_tree=False, compact_nodes=False), reach)
 
 
 def places_near(finder: Finder, points: Floats, normals: Floats, within: Floats) -> tuple[Spots, Floats]:
@@ -87,21 +89,29 @@ def places_near(finder: Finder, points: Floats, normals: Floats, within: Floats)
     Points nearer to a place than `within` (n,) are sought no further.
     """
     charts = finder.charts
-    where = np.concatenate([points, finder.reach * normals], axis=1)
-    count = min(STARTS, len(finder.spots.row))
-    near = finder.tree.query(where, k=count)[1].reshape(len(points), count)
     row, bary = np.zeros(len(points), dtype=np.int64), np.tile([1.0, 0.0, 0.0], (len(points), 1))
     off = np.full(len(points), np.inf)
+    count = min(STARTS, len(finder.spots.row))
     for start in range(count):
         lost = np.flatnonzero(off > within)
         if not len(lost):
             break
-        spots = _walked_to(charts, finder.spots.take(near[lost, start]), points[lost])
+        where = np.concatenate([points[lost], finder.reach * normals[lost]], axis=1)
+        # Few need more than the nearest sample.
+        near = finder.tree.query(where, k=[start + 1])[1][:, 0]
+        spots = _walked_to(charts, finder.spots.take(near), points[lost])
         away = np.linalg.norm(positions(charts, spots) - points[lost], axis=1)
         better = away < off[lost]
         found = lost[better]
         row[found], bary[found], off[found] = spots.row[better], spots.barycentric[better], away[better]
     return Spots(row, bary), off
+
+
+def rows_near(finder: Finder, points: Floats, normals: Floats) -> Ints:
+    """Triangles (n,) near to `points` (n, 3) that face as `normals` (n, 3) do: enough to tell sheets apart."""
+    if finder.charts.region.single_sheet:
+        return np.zeros(len(points), dtype=np.int64)
+    return finder.spots.row[finder.tree.query(np.concatenate([points, finder.reach * normals], axis=1))[1]]
 
 
 def _walked_to(charts: Charts, spots: Spots, points: Floats) -> Spots:
@@ -199,7 +209,11 @@ def _off(
     boundary, as about `most` of either show.
     """
     region = finder.charts.region
-    spots = finder.spots.take(np.arange(0, len(finder.spots.row), len(finder.spots.row) // most + 1))
+    # A region in a plane is what its boundary says; a few places show that the plane is the right one.
+    number_of_places = FEW if region.flat and boundary is not None else most
+    spots = finder.spots.take(
+        np.arange(0, len(finder.spots.row), len(finder.spots.row) // number_of_places + 1)
+    )
     image, place, off = _mirrored(finder, group, number, positions(finder.charts, spots), spots.row)
     if boundary is not None:
         # A walk that the boundary stops need not end at the nearest place; for what is outside that is on it.
@@ -212,8 +226,9 @@ def _off(
     ends, row = region.boundary_segments, region.rim[:, 0]
     points, row = np.concatenate([ends[:, 0], ends.mean(axis=1)]), np.tile(row, 2)
     some = slice(None, None, len(points) // most + 1)
-    image, place, _ = _mirrored(finder, group, number, points[some], row[some])
-    distance, _ = nearest_boundary(boundary, image, place.row)
+    image = image_of(group, np.full(len(points[some]), number), points[some])
+    there = rows_near(finder, image, region.normals[row[some]] @ group.turns[number].T)
+    distance, _ = nearest_boundary(boundary, image, there)
     return max(worst, float(distance.max()))
 
 
@@ -225,15 +240,19 @@ def _mirrored(
     """
     image = image_of(group, np.full(len(points), number), points)
     normals = finder.charts.region.normals[row] @ group.turns[number].T
-    place, off = places_near(finder, image, normals, np.full(len(points), 1e-9 * finder.charts.region.extent))
+    within = np.full(len(points), NEAR_ENOUGH * TOLERANCE * finder.reach)
+    place, off = places_near(finder, image, normals, within)
     return image, place, off
 
 
 def _metric_off(finder: Finder, pitch: Lengths, group: Isometries, number: int) -> float:
     """The largest share by which the metric at a place and at its image differ."""
     spots = finder.spots
+    here = pitch(spots)
+    if np.ptp(here) == 0:
+        return 0.0
     _, place, _ = _mirrored(finder, group, number, positions(finder.charts, spots), spots.row)
-    return float(np.abs(pitch(place) / pitch(spots) - 1).max())
+    return float(np.abs(pitch(place) / here - 1).max())
 
 
 def _where(group: Isometries) -> str:

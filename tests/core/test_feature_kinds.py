@@ -23,11 +23,12 @@ from bubble_pattern_addon.core.feature_sizes import feature_sizes
 from bubble_pattern_addon.core.heading import axes, square_to
 from bubble_pattern_addon.core.loft import make_solids
 from bubble_pattern_addon.core.mesh import Floats, Mesh
+from bubble_pattern_addon.core.part import Part
 from bubble_pattern_addon.core.pattern import Pattern
 from bubble_pattern_addon.core.profile import outlines
 from bubble_pattern_addon.core.progress import drive
 from bubble_pattern_addon.core.section import Extent
-from bubble_pattern_addon.core.solid import Part, part_steps
+from bubble_pattern_addon.core.solid import part_steps
 from tests.core.bases import as_mesh, box, hexagons, laid, on_slab, slab
 
 UP = (0.0, 0.0, 1.0)

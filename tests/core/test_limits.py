@@ -196,7 +196,7 @@ limits = st.builds(Limits, st.floats(0, 2), st.floats(0, 3), st.floats(0, 1.5))
 
 
 @given(shapings(), limits)
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=40, deadline=None, derandomize=True)
 def test_the_limits_hold_for_any_fields(shaping: Shaping, limits: Limits) -> None:
     recipe = Recipe(packing=PACKING, shaping=shaping, limits=limits)
     try:
@@ -209,7 +209,7 @@ def test_the_limits_hold_for_any_fields(shaping: Shaping, limits: Limits) -> Non
 
 
 @given(random_fields(3.0, 9.0), shapings(), limits)
-@settings(max_examples=8, deadline=None, derandomize=True)
+@settings(max_examples=6, deadline=None, derandomize=True)
 def test_the_limits_hold_on_graded_packings_too(pitch: Described, shaping: Shaping, limits: Limits) -> None:
     shaping = replace(shaping, seeds=())
     recipe = Recipe(packing=replace(PACKING, pitch=pitch), shaping=shaping, limits=limits)

@@ -10,13 +10,14 @@ from bubble_pattern_addon.core.fields import Linear, Radial
 from bubble_pattern_addon.core.files import load_base
 from bubble_pattern_addon.core.mesh import Mesh
 from bubble_pattern_addon.core.metric import Constant, Described
+from bubble_pattern_addon.core.part import Part
 from bubble_pattern_addon.core.pattern import Pattern
 from bubble_pattern_addon.core.pipeline import pattern_steps
 from bubble_pattern_addon.core.progress import drive
 from bubble_pattern_addon.core.quality import min_margin, min_web
 from bubble_pattern_addon.core.recipe import Feature, Packing, Recipe, Shaping
 from bubble_pattern_addon.core.region import make_region
-from bubble_pattern_addon.core.solid import Part, part_steps
+from bubble_pattern_addon.core.solid import part_steps
 from bubble_pattern_addon.core.surroundings import Surroundings
 from scripts.shapes import Shape, curved_slab, plate, thin_wall, trapezoid_slab
 from tests.core.bases import polygon_area

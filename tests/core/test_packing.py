@@ -83,12 +83,12 @@ def test_both_integrators_reach_the_same_equilibrium(name, pitch):
     """From the same start, an equilibrium knocked by up to 3 % of the pitch, no bubble ends elsewhere."""
     _, ground, bubbles = packed(name, pitch)
     local = local_pitch(ground, bubbles)
-    settled, _ = relax(ground, bubbles, local, 4000, 1e-7)
+    settled, _ = relax(ground, bubbles, local, 2000, 1e-6)
     chance = np.random.default_rng(5)
     knock = (chance.uniform(-1, 1, (len(bubbles), 2)) @ np.array([1, 1j])) * 0.03 * pitch
     start = knocked(ground, settled, knock)
-    quick, work = relax(ground, start, local, 3000, 1e-7)
-    slow, reference = integrate(ground, start, local, 3000, 1e-7)
+    quick, work = relax(ground, start, local, 1500, 1e-6)
+    slow, reference = integrate(ground, start, local, 1000, 1e-6)
     assert np.linalg.norm(points_of(ground, start) - points_of(ground, settled), axis=1).max() > 0.02 * pitch
     away = np.linalg.norm(points_of(ground, quick) - points_of(ground, slow), axis=1)
     assert away.max() < 1e-3 * pitch

@@ -13,10 +13,11 @@ from scipy.spatial.transform import Rotation
 from bubble_pattern_addon.core import solid, splitting
 from bubble_pattern_addon.core.errors import BaseError, RecipeError
 from bubble_pattern_addon.core.mesh import Mesh
+from bubble_pattern_addon.core.part import Cut, Part
 from bubble_pattern_addon.core.pattern import Pattern
 from bubble_pattern_addon.core.progress import drive
 from bubble_pattern_addon.core.recipe import Feature
-from bubble_pattern_addon.core.solid import Cut, Part, carry_corners, part_steps
+from bubble_pattern_addon.core.solid import carry_corners, part_steps
 from tests.core.bases import (
     box,
     hexagons,

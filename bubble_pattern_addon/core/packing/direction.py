@@ -15,6 +15,7 @@ from scipy.sparse import coo_array, csr_array, diags_array
 
 from ..mesh import Bools, Floats, Ints
 from ..surface import Charts, Complex, product
+from .symmetric_field import Alike, most_alike, on_patches
 
 # Diffusion per round as a share of the area, and rounds of it.
 SPREAD, ROUNDS = 0.001, 14
@@ -26,10 +27,11 @@ NEARLY = 0.05
 MOST_STEPS = 200
 
 
-def smooth_directions(charts: Charts, chosen: Bools) -> Complex:
+def smooth_directions(charts: Charts, chosen: Bools, alike: Alike | None = None) -> Complex:
     """Sixth powers of unit row directions in the frames of the triangles, (R,); 0 where not `chosen` (R,).
 
-    chosen: triangles of whole connected parts without a boundary
+    chosen: triangles of whole connected parts without a boundary; alike: makes such values (R,) what they
+    shall stay, such as symmetric
     """
     region = charts.region
     members = np.flatnonzero(chosen)
@@ -44,10 +46,16 @@ def smooth_directions(charts: Charts, chosen: Bools) -> Complex:
     # The frames' own directions, which are at odds: from a smooth start, such as one direction of space seen
     # on the surface, the misfits that belong to it never part.
     value = _diffused(coarse, share, np.ones(coarse.shape[0], dtype=np.complex128))
+    if alike is not None:
+        kept = on_patches(alike, members, len(chosen), [(patch, turn) for _, patch, turn in levels])
+        value = _diffused(coarse, share, most_alike(kept, value), kept)
     for finer, patch, turn in reversed(levels):
         value = _evened(finer, product(value[patch], turn))
     result = np.zeros(len(chosen), dtype=np.complex128)
     result[members] = value
+    if alike is not None:
+        result = alike(result)
+        result[members] /= np.maximum(np.abs(result[members]), 1e-300)
     return result
 
 
@@ -118,11 +126,12 @@ def _evened(laplacian: csr_array, value: Complex) -> Complex:
     return value
 
 
-def _diffused(laplacian: csr_array, area: Floats, value: Complex) -> Complex:
-    """Unit values after ROUNDS of diffusing and normalising."""
+def _diffused(laplacian: csr_array, area: Floats, value: Complex, kept: Alike | None = None) -> Complex:
+    """Unit values after ROUNDS of diffusing and normalising, each `kept` what it shall stay."""
     implicit = (diags_array(area.astype(np.complex128)) + SPREAD * laplacian).tocsr()
     for _ in range(ROUNDS):
         value = _solved(implicit, area * value, value)
+        value = value if kept is None else kept(value)
         value = value / np.maximum(np.abs(value), 1e-300)
     return value
 

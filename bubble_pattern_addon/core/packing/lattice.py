@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..boundary import signature
-from ..mesh import Floats
+from ..mesh import Bools, Floats
 from ..progress import Progress, Snapshot, Steps, drive
 from ..surface import Charts, Complex, Spots, positions, product, to_frame, to_space, walk
 from .bubbles import joined
@@ -48,9 +48,17 @@ def grow(
 
 
 def growing_steps(
-    charts: Charts, pitch: Lengths, seeds: Spots, directions: Complex, most: int, field: Complex | None = None
+    charts: Charts,
+    pitch: Lengths,
+    seeds: Spots,
+    directions: Complex,
+    most: int,
+    field: Complex | None = None,
+    wanted: Callable[[Spots], Bools] | None = None,
 ) -> Steps[tuple[Spots, Complex]]:
-    """Like grow, with a pause after every few generations, in which the bubbles can be looked at."""
+    """Like grow, with a pause after every few generations, in which the bubbles can be looked at; over the
+    places that are `wanted`, or everywhere.
+    """
     crowded = CROWDED if field is None else CROWDED_CLOSED
     crowd = _Crowd(charts, float(pitch(seeds).max()), crowded)
     spots, heading = seeds, directions
@@ -67,6 +75,9 @@ def growing_steps(
             )
         proposals, turned, beyond = _proposals(charts, pitch, crowd, front, front_heading)
         front, front_heading = _agreed(charts, pitch, crowd, proposals, turned, beyond)
+        if wanted is not None:
+            here = wanted(front)
+            front, front_heading = front.take(here), front_heading[here]
         if field is not None:
             front_heading = _following(front_heading, field[front.row])
         crowd.add(front)

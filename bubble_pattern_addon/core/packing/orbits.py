@@ -15,30 +15,38 @@ from ..boundary import signature
 from ..isometries import Isometries, depth, first_alike, image_of, images, settled
 from ..mesh import Floats, Ints
 from ..surface import Spots, positions
-from ..symmetry import Symmetry, places_near
+from ..symmetry import Symmetry, places_near, rows_near
 from .bubbles import Bubbles, Ground, joined
 from .crowding import close_pairs, uncrowded
+from .domain import led_here
 
 # A bubble nearer to its own image than this, in pitches, stands on the plane or axis instead.
-ON_IT = 0.7
+ON_IT = 0.6
 # A bubble and an image of another's closer than this, in pitches, do not both fit; nor do two bubbles closer
 # than CROWDED, what is between is left to population control.
 APART, CROWDED = 0.74, 0.45
-# Bubbles this far outside the part of space that is packed, in pitches, may lead as well.
-MARGIN = 0.36
+# Who is moved onto a plane may crowd those nearer than this, in pitches.
+BESIDE = 1.5
 # Followers this near to a leader, in pitches, are felt by it or may come to be.
 HALO = 3.2
+# Beyond this, in pitches, a void is another domain's to fill.
+SEEN = 1.7
+# A place this near to an image, in pitches, is the one: walks from other places would end there too.
+FOUND = 0.01
 # An image farther than this from the region, in pitches, has no place there.
 LOST = 0.1
 
 
 @dataclass(frozen=True)
 class Followers:
-    """Images of leaders. leader: (h,) whose image each is; number: (h,) under which isometry; spots: where"""
+    """Images of leaders. leader: (h,) whose image each is; number: (h,) under which isometry; points: (h, 3)
+    where; row: (h,) of triangles near there, which tell sheets apart
+    """
 
     leader: Ints
     number: Ints
-    spots: Spots
+    points: Floats
+    row: Ints
 
 
 def on_their_planes(ground: Ground, spots: Spots, pitch: Floats) -> tuple[Spots, Floats]:
@@ -55,7 +63,7 @@ def on_their_planes(ground: Ground, spots: Spots, pitch: Floats) -> tuple[Spots,
     normals = ground.charts.region.normals[row[moved]]
     # On a curved surface, the nearest place to a point of the plane need not be on the plane.
     for _ in range(8):
-        found, _ = places_near(symmetry.finder, there[moved], normals, 1e-9 * pitch[moved])
+        found, _ = places_near(symmetry.finder, there[moved], normals, FOUND * pitch[moved])
         at = positions(ground.charts, found)
         there[moved] = settled(symmetry.group, at, ON_IT * pitch[moved])
         off[moved] = np.linalg.norm(there[moved] - at, axis=1) / pitch[moved]
@@ -72,14 +80,13 @@ def leaders_of(ground: Ground, candidates: Spots, rank: Ints) -> Ints:
     """
     symmetry, charts = _symmetry(ground), ground.charts
     points, pitch = positions(charts, candidates), ground.pitch(candidates)
-    inside = np.flatnonzero(depth(symmetry.group, points) > -MARGIN * pitch)
+    inside = np.flatnonzero(led_here(ground, points, pitch))
     everyone = followers_of(ground, candidates.take(inside), pitch[inside])
     lost = np.zeros(len(inside), dtype=bool)
-    at = positions(charts, everyone.spots)
-    wanted = image_of(symmetry.group, everyone.number, points[inside][everyone.leader])
-    far = np.linalg.norm(at - wanted, axis=1) > LOST * pitch[inside][everyone.leader]
-    lost[everyone.leader[far]] = True
-    spots = joined(candidates.take(inside), everyone.spots)
+    followers = _located(ground, candidates.take(inside), pitch[inside], everyone)
+    away = np.linalg.norm(positions(charts, followers) - everyone.points, axis=1)
+    lost[everyone.leader[away > LOST * pitch[inside][everyone.leader]]] = True
+    spots = joined(candidates.take(inside), followers)
     owner = np.concatenate([np.arange(len(inside)), everyone.leader])
     local = pitch[inside][owner]
     where = signature(charts.region, positions(charts, spots), spots.row, float(local.max(initial=0.0)))
@@ -121,12 +128,13 @@ def settled_leaders(ground: Ground, bubbles: Bubbles) -> Bubbles:
     moved = (spots.row != bubbles.spots.row) | (spots.barycentric != bubbles.spots.barycentric).any(axis=1)
     if not moved.any():
         return bubbles
-    # Whoever is on a plane stays in any case; one that has just been moved there may crowd others.
-    rank = np.lexsort((np.arange(len(bubbles)), moved, np.arange(len(bubbles)) >= bubbles.fixed)).argsort()
-    chosen = leaders_of(ground, spots, rank)
-    kept = np.zeros(len(bubbles), dtype=bool)
-    kept[chosen] = True
-    kept |= ~moved
+    # Whoever is on a plane stays in any case; one that has just been moved there may crowd others near it.
+    points = positions(ground.charts, spots)
+    beside = cKDTree(points[moved]).query(points)[0] < BESIDE * ground.pitch(spots)
+    some = np.flatnonzero(beside)
+    rank = np.lexsort((some, moved[some], some >= bubbles.fixed)).argsort()
+    kept = ~moved
+    kept[some[leaders_of(ground, spots.take(some), rank)]] = True
     kept &= off < LOST
     return Bubbles(spots.take(kept), int(kept[: bubbles.fixed].sum()))
 
@@ -155,13 +163,21 @@ def followers_of(ground: Ground, spots: Spots, pitch: Floats, reach: float | Non
         widest = reach * float(pitch.max())
         near = cKDTree(points).query(at, distance_upper_bound=widest)[0] < widest
         leader, number, at = leader[near], number[near], at[near]
-    return Followers(leader, number, _located(ground, spots, pitch, leader, number, at))
+    normals = _turned_normals(ground, spots, leader, number)
+    return Followers(leader, number, at, rows_near(symmetry.finder, at, normals))
 
 
-def _located(ground: Ground, spots: Spots, pitch: Floats, leader: Ints, number: Ints, at: Floats) -> Spots:
-    symmetry, region = _symmetry(ground), ground.charts.region
-    normals = np.einsum("nab,nb->na", symmetry.group.turns[number], region.normals[spots.row[leader]])
-    return places_near(symmetry.finder, at, normals, 1e-9 * pitch[leader])[0]
+def _turned_normals(ground: Ground, spots: Spots, leader: Ints, number: Ints) -> Floats:
+    """Which way the surface faces, (h, 3), at the images of `leader` (h,) under the isometries `number` (h,)."""
+    region = ground.charts.region
+    return np.einsum("nab,nb->na", _symmetry(ground).group.turns[number], region.normals[spots.row[leader]])
+
+
+def _located(ground: Ground, spots: Spots, pitch: Floats, followers: Followers) -> Spots:
+    """Places of the followers on the surface."""
+    normals = _turned_normals(ground, spots, followers.leader, followers.number)
+    within = FOUND * pitch[followers.leader]
+    return places_near(_symmetry(ground).finder, followers.points, normals, within)[0]
 
 
 def with_followers(ground: Ground, bubbles: Bubbles) -> Bubbles:
@@ -175,7 +191,7 @@ def with_followers(ground: Ground, bubbles: Bubbles) -> Bubbles:
     owner = np.concatenate([np.arange(n), everyone.leader])
     number = np.concatenate([np.zeros(n, dtype=np.int64), everyone.number])
     order = np.lexsort((number, owner))
-    spots = joined(bubbles.spots, everyone.spots).take(order)
+    spots = joined(bubbles.spots, _located(ground, bubbles.spots, pitch, everyone)).take(order)
     owner, number = owner[order], number[order]
     table = np.full((n, len(group)), -1)
     table[owner, number] = np.arange(len(owner))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from ..symmetry import find_symmetry
 from .bubbles import Bubbles, Ground, Pins, can_move, joined
 from .crowding import close_pairs, uncrowded
 from .direction import smooth_directions
+from .domain import all_reached, grown_here, led_here
 from .force import STIFFNESS, stiff_law
 from .inset import inset_track
 from .lattice import growing_steps
@@ -27,6 +29,7 @@ from .narrows import in_the_narrows
 from .orbits import orbit_sizes, settled_leaders, symmetric_start, with_followers
 from .pins import PUSHED, check_apart, clear_of, on_surface, track_through, with_pins
 from .plane import fills_its_box, lay
+from .plane_rows import rather_along, with_plane_rows
 from .population import control
 from .relax import relax_steps
 from .rim import (
@@ -39,6 +42,7 @@ from .rim import (
     straight_stretches,
 )
 from .rk4 import integration_steps
+from .symmetric_field import symmetric_mean
 from .symmetric_start import loop_starts, suiting, symmetric_seeds
 
 # A recipe that asks for more bubbles than this is taken for a slip of the pen.
@@ -161,6 +165,7 @@ def _settled(
         steps = max(packing.iterations // (2 if number > 0 else 1), 1)
         settling = settle(ground, bubbles, filling(ground, bubbles, local), steps, packing.tolerance)
         bubbles, _ = yield from within(settling, 0.2 + 0.2 * number, 0.4 + 0.2 * number)
+        bubbles, local = _on_planes_again(ground, bubbles, local)
         bubbles, changed = control(ground, bubbles, local)
         if changed <= FEW_CHANGED * len(bubbles):
             break
@@ -181,13 +186,24 @@ def _settled(
         bubbles, _ = yield from within(evening, 0.8, 0.95)
         # What stiff contacts have squeezed through the first row has no place between it and the boundary,
         # and what these have opened another bubble may fit into.
-        local, more = local_pitch(ground, bubbles), number + 1 < LAST_ROUNDS
+        bubbles, local = _on_planes_again(ground, bubbles, local_pitch(ground, bubbles))
+        more = number + 1 < LAST_ROUNDS
         bubbles, changed = control(ground, bubbles, local, last=True, filling=more)
         if not changed:
             break
     if ground.symmetry is not None:
         bubbles = with_followers(ground, settled_leaders(ground, bubbles))
     return bubbles
+
+
+def _on_planes_again(ground: Ground, bubbles: Bubbles, local: Floats) -> tuple[Bubbles, Floats]:
+    """The bubbles of a symmetric pattern after they have moved, those on planes exactly there: one beside its
+    own image would crowd that. And their local pitches (n,).
+    """
+    if ground.symmetry is None:
+        return bubbles, local
+    bubbles = settled_leaders(ground, bubbles)
+    return bubbles, local_pitch(ground, bubbles)
 
 
 def filling(ground: Ground, bubbles: Bubbles, local: Floats) -> Floats:
@@ -271,16 +287,25 @@ def _without_conflicts(ground: Ground, row: FirstRow) -> FirstRow:
 def _lattice(ground: Ground, seeds: Spots, directions: Complex) -> Steps[Spots]:
     """Bubbles of a lattice that fills what the first row leaves free."""
     charts = ground.charts
-    seeds, directions, origin = symmetric_seeds(ground, seeds, directions)
     uniform = ground.uniform if charts.region.flat else None
     if uniform is not None and ground.boundary is not None and fills_its_box(charts, uniform):
+        seeds, directions, origin = symmetric_seeds(ground, seeds, directions, anywhere=True)
         clear = CLEAR_OF_RIM * uniform + ground.edge_offset
-        return lay(charts, ground.boundary, uniform, clear, seeds, directions, origin)
+        wanted = partial(led_here, ground, pitch=np.float64(uniform))
+        return lay(charts, ground.boundary, uniform, clear, seeds, directions, origin, wanted)
+    seeds, directions, _ = symmetric_seeds(ground, seeds, directions, anywhere=False)
     closed = np.bincount(charts.region.sheet[charts.region.rim[:, 0]], minlength=len(seeds.row)) == 0
-    field = smooth_directions(charts, closed[charts.region.sheet]) if closed.any() else None
+    alike = None if ground.symmetry is None else symmetric_mean(ground.symmetry)
+    field = smooth_directions(charts, closed[charts.region.sheet], alike) if closed.any() else None
     if field is not None:
+        field = rather_along(ground, field)
         directions = np.where(closed, field[seeds.row] ** (1 / 6), directions)
-    spots, _ = yield from growing_steps(charts, ground.pitch, seeds, directions, MOST, field)
+    seeds, directions = with_plane_rows(ground, seeds, directions, field)
+    here = None
+    if ground.symmetry is not None and all_reached(ground, seeds):
+        here, own = partial(grown_here, ground), grown_here(ground, seeds)
+        seeds, directions = seeds.take(own), directions[own]
+    spots, _ = yield from growing_steps(charts, ground.pitch, seeds, directions, MOST, field, here)
     return _clear_of_rim(ground, spots)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -35,10 +37,11 @@ def lay(
     seeds: Spots,
     directions: Complex,
     origin: Floats,
+    wanted: Callable[[Floats], Bools],
 ) -> Spots:
     """Places of the lattices of one `pitch` through the points `origin` (s, 3), one for each part of a flat
     region, with a row along the direction that each of `seeds` has, as far as they are farther inside the
-    boundary than `clear`.
+    boundary than `clear` and, of points (n, 3), `wanted` (n,).
     """
     region = charts.region
     found: list[Spots] = []
@@ -47,6 +50,7 @@ def lay(
     for sheet in range(len(seeds.row)):
         rows = np.flatnonzero(region.sheet == sheet)
         points = _lattice_points(across[rows].reshape(-1, 2), axes, origin[sheet], along[sheet], pitch)
+        points = points[wanted(points)]
         own = np.full(len(points), rows[0])
         points = points[inside_distance(boundary, points, own) > clear]
         sought = in_plane(charts, points)

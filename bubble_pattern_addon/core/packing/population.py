@@ -11,8 +11,9 @@ from ..mesh import Bools, Floats, Ints
 from ..surface import Charts, Spots, positions, to_frame, walk
 from .bubbles import Bubbles, Ground, joined
 from .crowding import close_pairs, uncrowded
+from .domain import led_here
 from .force import Pairs, find_pairs
-from .orbits import HALO, followers_of, leaders_of, on_their_planes, ranked, settled_leaders
+from .orbits import HALO, SEEN, followers_of, leaders_of, on_their_planes, ranked, settled_leaders
 
 # A circle through three bubbles with no other inside is a void when its radius is above this share of the
 # pitch (it is 0.577 in the hexagonal arrangement, 0.707 in the square one).
@@ -55,11 +56,12 @@ def control(
     if there is to be any `filling`.
     """
     spots, n, m = bubbles.spots, len(bubbles), bubbles.fixed
-    owner = np.arange(n)
+    points, row, owner = positions(ground.charts, spots), spots.row, np.arange(n)
     if ground.symmetry is not None:
         followers = followers_of(ground, spots, pitch, HALO)
-        spots, owner = joined(spots, followers.spots), np.concatenate([owner, followers.leader])
-    points, row, everywhere = positions(ground.charts, spots), spots.row, pitch[owner]
+        points, row = np.concatenate([points, followers.points]), np.concatenate([row, followers.row])
+        owner = np.concatenate([owner, followers.leader])
+    everywhere = pitch[owner]
     pairs = find_pairs(ground.charts, points, row, everywhere, 0.0)
     distance = np.linalg.norm(points[pairs.first] - points[pairs.second], axis=1)
     ratio = overlap_ratio(pairs, distance, everywhere)
@@ -68,7 +70,7 @@ def control(
         most = CROWDED if ground.uniform is not None else CROWDED_GRADED
         gone[m:] |= _too_crowded(pairs, distance / pairs.stable, ratio[:n], owner, m, most)
     lonely, least = np.flatnonzero(ratio < LONELY), LAST_VOID if last else VOID
-    lonely = lonely if filling else lonely[:0]
+    lonely = lonely[led_here(ground, points[lonely], everywhere[lonely], SEEN)] if filling else lonely[:0]
     added = _voids(ground, points, row, everywhere, lonely, pairs, least)
     if not gone.any() and not len(added.row):
         return bubbles, 0
@@ -165,7 +167,7 @@ def _in_circles(
         return nothing, False
     centre, radius = _circumcircles(at[triple])
     mean = local[triple].mean(axis=1)
-    empty = (radius > least * mean) & (radius < WIDEST * mean)
+    empty = (radius > least * mean) & (radius < WIDEST * mean) & led_here(ground, centre, mean)
     empty[empty] = ~_taken(points, pairs, lonely[triple[empty]], centre[empty], 0.7 * radius[empty])
     wide = bool((empty & (radius > WIDE * mean)).any())
     empty &= radius < WIDE * mean
@@ -223,7 +225,7 @@ def _beside_two(ground: Ground, points: Floats, row: Ints, pitch: Floats, front:
     ahead = between / np.maximum(length, 1e-300)[:, None]
     left = np.cross(region.normals[row[one]], ahead)
     target = points[one] + along[:, None] * ahead + across[:, None] * left
-    free = cKDTree(points).query(target)[0] > 0.8 * FREE * new
+    free = (cKDTree(points).query(target)[0] > 0.8 * FREE * new) & led_here(ground, target, new)
     one, target = one[free], target[free]
     if ground.boundary is not None:
         distance, _ = nearest_boundary(ground.boundary, target, row[one])

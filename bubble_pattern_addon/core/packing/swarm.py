@@ -15,7 +15,7 @@ from ..isometries import image_of
 from ..mesh import Bools, Floats, Ints
 from ..progress import Snapshot
 from ..surface import Spots, positions, to_frame, walk
-from .bubbles import Bubbles, Ground, can_move, joined
+from .bubbles import Bubbles, Ground, can_move
 from .force import NO_PAIRS, Law, Pairs, find_pairs, renewed_pairs, within_reach
 from .orbits import HALO, Followers, followers_of, held
 
@@ -83,24 +83,27 @@ class Swarm:
 def swarm_of(ground: Ground, bubbles: Bubbles, pitch: Floats) -> Swarm:
     """The bubbles as arrays, with their pairs listed."""
     charts, spots = ground.charts, bubbles.spots
+    points, row, bary = positions(charts, spots), spots.row.copy(), spots.barycentric.copy()
     followers = still = None
     if ground.symmetry is not None:
         followers = followers_of(ground, spots, pitch, HALO)
-        projectors = held(ground.symmetry.group, positions(charts, spots), pitch)
+        projectors = held(ground.symmetry.group, points, pitch)
         special = np.flatnonzero(np.abs(projectors - np.eye(3)).max(axis=(1, 2)) > 1e-9)
         still = special, projectors[special]
-        spots = joined(spots, followers.spots)
+        points = np.concatenate([points, followers.points])
+        row = np.concatenate([row, followers.row])
+        # Followers never walk: where in their triangles they are is not asked.
+        bary = np.concatenate([bary, np.full((len(followers.row), 3), 1 / 3)])
         pitch = np.concatenate([pitch, pitch[followers.leader]])
-    points = positions(charts, spots)
     swarm = Swarm(
         ground=ground,
         bubbles=bubbles,
         pitch=pitch,
         points=points,
         landed=points.copy(),
-        row=spots.row.copy(),
-        bary=spots.barycentric.copy(),
-        normal=charts.region.normals[spots.row],
+        row=row,
+        bary=bary,
+        normal=charts.region.normals[row],
         pairs=NO_PAIRS,
         listed_at=points.copy(),
         followers=followers,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..isometries import images
+from ..isometries import depth, images
 from ..mesh import Bools, Floats, Ints
 from ..surface import Complex, Spots, positions, to_frame, to_space
 from ..symmetry import Symmetry, places_near
@@ -110,9 +110,12 @@ def suiting(ground: Ground, points: Floats, pitch: Floats) -> Bools:
     return np.linalg.norm(still - points, axis=1) < SUITS * pitch
 
 
-def symmetric_seeds(ground: Ground, seeds: Spots, directions: Complex) -> tuple[Spots, Complex, Floats]:
+def symmetric_seeds(
+    ground: Ground, seeds: Spots, directions: Complex, anywhere: bool
+) -> tuple[Spots, Complex, Floats]:
     """Seeds of lattices that are symmetric themselves, where the parts of the region are; their row
-    directions; and the points (s, 3) that the seeds stand for, which in a plane may be outside the region.
+    directions; and the points (s, 3) that the seeds stand for, which where the region is flat and they may be
+    `anywhere` may be outside it.
 
     A lattice through a point of a plane with a row along it, or at a multiple of 30 degrees to it, is its own
     mirror image; one round an axis is so for 2-, 3- and 6-fold rotations.
@@ -127,11 +130,18 @@ def symmetric_seeds(ground: Ground, seeds: Spots, directions: Complex) -> tuple[
         seed = seeds.take(np.array([part]))
         for chosen in _subgroups(symmetry, own[:, part]):
             turns = symmetry.group.turns[chosen]
+            if anywhere:
+                points[part] = _still(symmetry, points[part], turns)
+                headings[part] = _rounded(ground, seed, headings[part], turns)
+                break
             found, target, off = _still_place(ground, symmetry, seed, turns)
-            if off < ON_IT or (ground.charts.region.flat and ground.uniform is not None):
+            if off < ON_IT:
                 row[part], bary[part], points[part] = found.row[0], found.barycentric[0], target
                 headings[part] = _rounded(ground, found, _carried(ground, seed, found, headings[part]), turns)
                 break
+        else:
+            found, headings[part] = _led_image(ground, symmetry, seed, headings[part], own[:, part])
+            row[part], bary[part] = found.row[0], found.barycentric[0]
     return Spots(row, bary), headings, points
 
 
@@ -162,16 +172,39 @@ def _still_place(
     """The place near `seed` that the isometries leave where it is, that point (3,), and how far the place is
     from it, in pitches.
     """
-    centre, still = symmetry.group.centre, turns.mean(axis=0)
-    target = centre + (positions(ground.charts, seed) - centre) @ still.T
+    target = _still(symmetry, positions(ground.charts, seed), turns)
     normals, pitch = ground.charts.region.normals[seed.row], ground.pitch(seed)
     for _ in range(ROUNDS):
         found, _ = places_near(symmetry.finder, target, normals, 1e-9 * pitch)
         at = positions(ground.charts, found)
         if ground.charts.region.flat:
             break
-        target = centre + (at - centre) @ still.T
+        target = _still(symmetry, at, turns)
     return found, target[0], float(np.linalg.norm(target - at) / pitch[0])
+
+
+def _led_image(
+    ground: Ground, symmetry: Symmetry, seed: Spots, heading: complex, own: Bools
+) -> tuple[Spots, complex]:
+    """The image of a seed under those of the isometries that are its part's `own`, (k,), that is deepest
+    inside where leaders are packed; and its direction there.
+    """
+    at = images(symmetry.group, positions(ground.charts, seed))[:, 0]
+    number = int(np.where(own, depth(symmetry.group, at), -np.inf).argmax())
+    if number == 0:
+        return seed, heading
+    turn, within = symmetry.group.turns[number], 1e-9 * ground.pitch(seed)
+    normals = ground.charts.region.normals[seed.row] @ turn.T
+    found, _ = places_near(symmetry.finder, at[[number]], normals, within)
+    along = to_space(ground.charts, seed.row, np.array([heading])) @ turn.T
+    there = to_frame(ground.charts, found.row, along)[0]
+    return found, complex(there / abs(there))
+
+
+def _still(symmetry: Symmetry, points: Floats, turns: Floats) -> Floats:
+    """The points (..., 3) moved to where the isometries with these `turns` (k, 3, 3) leave them."""
+    centre = symmetry.group.centre
+    return centre + (points - centre) @ turns.mean(axis=0).T
 
 
 def _carried(ground: Ground, seed: Spots, found: Spots, heading: complex) -> complex:
