@@ -131,9 +131,11 @@ def run_steps(base: LoadedBase, recipe_file: Path) -> Steps[Run]:
     sound_base(base.mesh)  # step 3 looks again; but nobody shall wait for a packing to be told of a hole
     if recipe.feature.through:
         check_one_side(base.mesh, selected)
-    surroundings = surroundings_of(base, read_images(recipe, recipe_file.parent))
-    clock.stop("region")
     stamp, solved = read_stamp(recipe, recipe_file.parent), None
+    surroundings = surroundings_of(base, read_images(recipe, recipe_file.parent))
+    if stamp is not None and recipe.feature.mesh is not None:
+        surroundings = replace(surroundings, meshes={recipe.feature.mesh: stamp})
+    clock.stop("region")
     if recipe.solve:
         solved = yield from clock.timed(within(solving_steps(region, recipe, surroundings), 0.0, 0.5))
         recipe, pattern = solved.recipe, solved.pattern

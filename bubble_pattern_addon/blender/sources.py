@@ -14,13 +14,14 @@ import bpy
 
 from ..core.errors import BaseError
 from ..core.field_tables import Wanted
-from ..core.mesh import Bools, Ints
+from ..core.mesh import Bools, Ints, digest
 from ..core.recipe import Recipe, RegionChoice
 from ..core.recipe_names import both, packing_names, shaping_names
 from ..core.region import Region, make_region
 from ..core.selection import select, sub_regions
 from ..core.surroundings import Surroundings
 from .cut_preview import hide_cut
+from .feature_objects import read_stamp
 from .keep_outs import cut_to_choice
 from .marked_side import on_marked_side
 from .reading import Base, evaluated_mesh, read_base, shown
@@ -78,13 +79,17 @@ def read_source(
         reading = less_keep_outs(reading, choice, context)
     painted = replace(reading.painted, images=images_of(names.images))
     surroundings = with_things(painted, names, reading.base.frame, context)
+    name = None if recipe is None else recipe.feature.mesh
+    meshes = {} if name is None else {name: read_stamp(name, context)}
+    surroundings = replace(surroundings, meshes=meshes)
+    features = "".join(digest(mesh.vertices, mesh.triangles).hex() for mesh in meshes.values())
     return Source(
         reading.base,
         reading.region,
         reading.selected,
         surroundings,
         reading.fingerprint + trace(surroundings, pitch_names),
-        trace(surroundings, size_names),
+        trace(surroundings, size_names) + features,
     )
 
 

@@ -18,7 +18,8 @@ from .partners import Kin, alike, along_or_square, kin_of, own_image
 from .pattern import Pattern
 from .profile import outlines, signed_area
 from .region import Region
-from .surroundings import Surroundings
+from .stamp import footprint, make_stamp
+from .surroundings import NOTHING, Surroundings
 
 # A direction this much shorter than it was, once laid square to the axis, points nowhere.
 NOWHERE = 1e-6
@@ -56,7 +57,7 @@ def headed(bubbles: Pattern, links: Links, feature: Feature, surroundings: Surro
             sizes[name] = _laid(size, name, bubbles, here)
     plain_angle = 0.0 if isinstance(feature.angle, Described) else feature.angle
     angle = np.radians(sizes.pop("angle", np.full(1, plain_angle)))
-    share = circle_share(feature, sizes.get("aspect"), len(bubbles))
+    share = circle_share(feature, sizes.get("aspect"), len(bubbles), surroundings)
     if feature.axis == 0 and feature.turn == "row" and not np.any(angle):
         return replace(bubbles, axis=None, heading=None, sizes=sizes, share=share)
     axis = axes(bubbles.normal, feature)
@@ -106,11 +107,18 @@ def _laid(described: Described, name: str, bubbles: Pattern, surroundings: Surro
     return values
 
 
-def circle_share(feature: Feature, aspect: Floats | None, count: int) -> Floats | None:
+def circle_share(
+    feature: Feature, aspect: Floats | None, count: int, surroundings: Surroundings = NOTHING
+) -> Floats | None:
     """Share of the circle round it that each of `count` features takes, (n,); None where it is the circle.
 
-    aspect: (n,) where it varies over the region. A mesh counts as its circle: its area is not looked at.
+    aspect: (n,) where it varies over the region. A mesh takes what it covers of its own plane, which lies on
+    the surface; one that is not among the surroundings counts as its circle. RecipeError for a mesh that can
+    be no feature.
     """
+    mesh = surroundings.meshes.get(feature.mesh or "")
+    if feature.profile == "mesh" and mesh is not None:
+        return np.full(count, footprint(make_stamp(mesh, feature)))
     if feature.profile in ("circle", "mesh"):
         return None
     given = ASPECTS.get(feature.profile, 1.0) if feature.aspect is None else feature.aspect

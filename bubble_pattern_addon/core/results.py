@@ -119,7 +119,7 @@ def _estimated(pattern: Pattern, region: Region, feature: Feature, deep: Floats)
     """Volume that straight features of these depths (n,) take away; nan for other kinds, whose part alone
     tells it.
     """
-    if feature.kind != "hole":
+    if feature.kind != "hole" or feature.profile == "mesh":
         return np.nan
     through = np.isnan(deep)
     if through.any():

@@ -68,6 +68,14 @@ def make_stamp(mesh: Mesh, feature: Feature) -> Stamp:
     return Stamp(whole, beyond, float(np.abs(vertices[:, 2]).max()), euler, _euler(half.triangles[cap]))
 
 
+def footprint(stamp: Stamp) -> float:
+    """The area that the mesh takes of the surface, as a share of the circle round it."""
+    cap = stamp.mesh.triangles[stamp.beyond[stamp.mesh.triangles].all(axis=1)]
+    a, b, c = stamp.mesh.vertices[cap, :2].transpose(1, 0, 2)
+    (ux, uy), (vx, vy) = (b - a).T, (c - a).T
+    return float(np.abs((ux * vy - uy * vx).sum()) / (2 * np.pi))
+
+
 def _one_side(mesh: Mesh, sign: int) -> Mesh | None:
     """The part of a closed mesh above the plane z = 0, or below it, closed; None where there is none."""
     solid = manifold3d.Manifold(

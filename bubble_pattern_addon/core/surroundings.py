@@ -58,6 +58,7 @@ class Surroundings:
     stored in the file: a picture's middle grey is 0.5
     objects: what stands beside the base
     vectors: (T, 3, 3) at the triangles' corners, in the base's coordinates
+    meshes: those that features name, each in its own coordinates
     pitch: the packing metric, bound; for diameters that are a share of it
     """
 
@@ -67,6 +68,7 @@ class Surroundings:
     uv_maps: Mapping[str, Floats] = field(default_factory=dict)
     images: Mapping[str, Floats] = field(default_factory=dict)
     objects: Mapping[str, Thing] = field(default_factory=dict)
+    meshes: Mapping[str, Mesh] = field(default_factory=dict)
     pitch: Field | None = None
     vectors: Mapping[str, Floats] = field(default_factory=dict)
 

@@ -184,6 +184,8 @@ def test_a_curve_and_a_mesh_as_features() -> None:
     settings.profile = 'MESH'
     settings.profile_mesh = cone
     settings.height = 0.0006
+    hexagon = settings.count * 3 * np.sqrt(3) / 8 * settings.diameter**2
+    assert settings.open_area == pytest.approx(hexagon / 0.05**2, rel=1e-4)
     activate(base)
     assert bpy.ops.bubble_pattern.apply() == {'FINISHED'}
     part = bpy.context.object

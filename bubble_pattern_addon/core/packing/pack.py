@@ -25,6 +25,7 @@ from .crowding import close_pairs, uncrowded
 from .direction import smooth_directions
 from .domain import all_reached, grown_here, led_here
 from .force import STIFFNESS, stiff_law
+from .inset import inset_track
 from .lattice import growing_steps
 from .narrows import in_the_narrows
 from .orbits import orbit_sizes, settled_leaders, symmetric_start, with_followers
@@ -39,7 +40,6 @@ from .rim import (
     Lengths,
     Track,
     first_row,
-    inset_track,
     on_track,
     spots_on_track,
     straight_stretches,
