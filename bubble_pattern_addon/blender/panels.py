@@ -21,7 +21,7 @@ from .hand_state import ByHand, by_hand_now
 from .presets import BUBBLE_PATTERN_PT_presets
 from .properties import in_scene, is_pattern, pattern_objects, pattern_of
 from .recipe_operators import draw_files
-from .settings_recipe import is_outdated
+from .settings_recipe import contradict, is_outdated
 from .sidebar import SidebarPanel, is_applied, large, sentences
 from .stepping import draw_progress
 
@@ -55,11 +55,7 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
         if active is None or active.type != 'MESH':
             layout.label(text="Select a mesh object", icon='INFO')
         elif context.mode == 'EDIT_MESH':
-            count = active.data.total_face_sel
-            text = (
-                f"{count:,} face{'s' if count != 1 else ''} selected" if count else "Select the faces to fill"
-            )
-            layout.label(text=text, icon='FACESEL')
+            draw_selected_faces(layout, active)
         else:
             marked = "bubble_region" in active.data.attributes
             layout.label(text="Region as marked" if marked else "Whole object", icon='OBJECT_DATA')
@@ -77,6 +73,8 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
             layout.label(text=obj.name, icon='MOD_PARTICLE_INSTANCE')
         trouble = settings.trouble or live.trouble_of(obj)
         outdated = bool(trouble) or is_outdated(settings)
+        # where settings contradict one another, no button helps before one of them is changed
+        mendable = outdated and not contradict(settings)
         run = runs.under_way()
         if run is not None and not run.ended:
             draw_progress(layout, run)
@@ -84,6 +82,8 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
             self.draw_points(layout, settings)
             return
         editing = context.mode == 'EDIT_MESH'
+        if editing:
+            draw_selected_faces(layout, context.active_object)
         placed = by_hand_now(obj)
         if placed.unsettled:
             self.draw_placed(context, layout, settings, placed)
@@ -95,13 +95,13 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
                 row.operator("bubble_pattern.add", text="", icon='ADD')
         else:
             row.operator("bubble_pattern.region_edit", icon='FACESEL')
-            if not outdated:
+            if not mendable:
                 row.operator("bubble_pattern.update", icon='FILE_REFRESH')
         if trouble:
             sentences(layout, trouble, context.region.width, 'ERROR')
         if outdated and (settings.hand_made or any(placed)):
             sentences(layout, paused(settings, placed), context.region.width, 'PAUSE')
-        if outdated:
+        if mendable:
             large(layout).operator("bubble_pattern.update", icon='FILE_REFRESH', depress=True)
         (layout.row() if outdated or editing else large(layout)).operator(
             "bubble_pattern.apply", icon='CHECKMARK'
@@ -148,6 +148,13 @@ class BUBBLE_PATTERN_PT_main(SidebarPanel, bpy.types.Panel):
         large(layout).operator("bubble_pattern.edit", icon='GREASEPENCIL')
         draw_files(layout)
         layout.operator("bubble_pattern.remove", icon='TRASH')
+
+
+def draw_selected_faces(layout: bpy.types.UILayout, base: bpy.types.Object) -> None:
+    """How many faces are selected, or that they are to be selected next."""
+    count = base.data.total_face_sel
+    text = f"{count:,} face{'s' if count != 1 else ''} selected" if count else "Select the faces to fill"
+    layout.label(text=text, icon='FACESEL')
 
 
 def paused(settings: Any, placed: ByHand) -> str:

@@ -165,6 +165,15 @@ def is_outdated(settings: Any) -> bool:
         return True
 
 
+def contradict(settings: Any) -> bool:
+    """Whether the settings make no sense together, or something is not chosen yet."""
+    try:
+        recipe_of(settings)
+    except RecipeError:
+        return True
+    return False
+
+
 def length_text(context: bpy.types.Context, value: float) -> str:
     """A length in the scene's unit."""
     units = context.scene.unit_settings

@@ -18,7 +18,7 @@ from .undercut import undercuts
 from .wall import DEEPEST, Fault
 
 SAID = 3
-"""Features that could not be added and are named in the check's problems; the part lists them all."""
+"""Reasons why features could not be added that are given in the check's problems; the part lists them all."""
 
 
 def judge(plan: Plan, left: Cut) -> Part:
@@ -83,9 +83,7 @@ def _verdict(
     blind = cut & (shape == euler - region)
     # where a mesh comes out of the wall again, its regions may be of any kind
     pierced = cut & ((shape == 0) if plan.stamp is None else (shape < euler - region)) & (not feature.adds)
-    problems = [text for _, text in failures[:SAID]]
-    if len(failures) > SAID:
-        problems.append(f"{nouns(f'more {feature.kind}', len(failures) - SAID)} could not be added either.")
+    problems = _told(plan, failures)
     good = pierced if feature.through else blind if plan.stamp is None else pierced | blind
     torn = np.flatnonzero(cut & ~good)
     if len(torn):
@@ -159,6 +157,26 @@ def _failures(plan: Plan) -> tuple[tuple[int, str], ...]:
         (int(which), f"{_place(plan, int(which)).capitalize()} {_reason(plan, int(which))}.")
         for which in np.flatnonzero(plan.fault)
     )
+
+
+def _told(plan: Plan, failures: tuple[tuple[int, str], ...]) -> list[str]:
+    """What could not be added and why: a sentence for each of the commonest reasons."""
+    told, kind = [], plan.feature.kind
+    faults, first, count = np.unique(plan.fault[plan.fault != 0], return_index=True, return_counts=True)
+    order = np.lexsort((first, -count))
+    for at in order[:SAID]:
+        which, sentence = failures[first[at]]
+        if count[at] == 1:
+            told.append(sentence)
+            continue
+        told.append(
+            f"{nouns(kind, int(count[at]))} could not be added: {_place(plan, which)}, the first of them, "
+            f"{_reason(plan, which)}."
+        )
+    if len(faults) > SAID:
+        rest = int(count[order[SAID:]].sum())
+        told.append(f"{nouns(f'more {kind}', rest)} could not be added for other reasons.")
+    return told
 
 
 def _reason(plan: Plan, which: int) -> str:

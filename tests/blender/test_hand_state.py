@@ -221,3 +221,34 @@ def test_patterns_never_touched_are_laid_as_before() -> None:
     count = pattern.bubble_pattern.count
     pattern.bubble_pattern.pitch = 1.2 * PITCH
     assert pattern.bubble_pattern.count < count
+
+
+def test_update_is_the_next_step_only_where_it_helps() -> None:
+    pattern = editing()
+    bpy.ops.object.mode_set(mode='OBJECT')
+    settings = pattern.bubble_pattern
+    settings.live = False
+    settings.pitch = 1.2 * PITCH
+    assert "bubble_pattern.update" in highlighted(pattern)
+    settings.diameter_field.kind = 'ATTRIBUTE'  # which is not chosen yet
+    assert settings_recipe.contradict(settings)
+    assert highlighted(pattern) == []
+
+
+def highlighted(pattern: Any) -> list[str]:
+    """Buttons of the main panel that stand out."""
+    found: list[str] = []
+
+    class Highlights(Layout):
+        def operator(self, name: str, **options: Any) -> None:
+            if options.get("depress"):
+                found.append(name)
+
+        def row(self, **_options: Any) -> Highlights:
+            return Highlights(self.drawn)
+
+    context = SimpleNamespace(active_object=pattern, mode='OBJECT', region=SimpleNamespace(width=250))
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(panels, "sentences", lambda *_: None)
+        panels.BUBBLE_PATTERN_PT_main.draw_pattern(SimpleNamespace(), context, Highlights([]), pattern)
+    return found
