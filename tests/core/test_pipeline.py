@@ -218,11 +218,11 @@ def test_edge_offset_moves_the_first_row_in() -> None:
 # -- graded --------------------------------------------------------------------------------------------------
 
 GRADED = [
-    # region, pitch, six, psi6, gap_min: as the issue asks for, but for the radial psi6 (.90 is asked for)
+    # region, pitch, six, psi6, gap_min: what they are to reach, on the panel within .02
     ("trapezoid", Linear(from_=2.0, to=6.0, direction=(1.0, 0.0, 0.0)), 0.90, 0.88, 0.82),
-    ("trapezoid", Radial(from_=1.0, to=4.0, centre=(-20.0, -10.0, 0.0)), 0.91, 0.88, 0.85),
+    ("trapezoid", Radial(from_=1.0, to=4.0, centre=(-20.0, -10.0, 0.0)), 0.91, 0.90, 0.85),
     ("panel", Linear(from_=4.0, to=12.0, direction=(1.0, 0.0, 0.0)), 0.88, 0.86, 0.80),
-    ("panel", Radial(from_=2.5, to=10.0, centre=(-30.0, -20.0, 20.0)), 0.89, 0.88, 0.83),
+    ("panel", Radial(from_=2.5, to=10.0, centre=(-30.0, -20.0, 20.0)), 0.89, 0.88, 0.82),
 ]
 
 
@@ -242,6 +242,30 @@ def test_a_graded_packing_is_in_order(
     assert quality.void < 0.9
     gap = cKDTree(pattern.position).query(pattern.position, 2)[0][:, 1] / pattern.pitch
     assert gap.mean() == pytest.approx(1, abs=0.04)
+
+
+@pytest.mark.parametrize("across", np.linspace(9, 28, 6))
+@pytest.mark.parametrize("turn", [0.0, 53.0, 143.0])
+def test_a_graded_lattice_ends_where_the_region_does(across: float, turn: float) -> None:
+    """As many bubbles as the packing metric has room for, wherever the nodes of its raster fall."""
+    shape = SHAPES["square"]()
+    region = make_region(shape.mesh, shape.selected)
+    side = np.sqrt(region.area)
+    pitch, way = side / across, side / 2 * np.exp(1j * np.radians(turn))
+    ends = (-way.real, -way.imag, 0.0), (way.real, way.imag, 0.0)
+    graded = Linear(from_=pitch, to=pitch / 2, start=ends[0], end=ends[1])
+    rounds = []
+
+    def count(progress: Progress) -> None:
+        rounds.append(progress.stage)
+        assert len(rounds) < 300, "it grows on and on"
+
+    pattern = drive(pattern_steps(region, Recipe(packing=Packing(pitch=graded))), count)
+    low, high = shape.mesh.vertices.min(axis=0), shape.mesh.vertices.max(axis=0)
+    places = np.stack(np.meshgrid(*(np.linspace(low[k], high[k], 200) for k in (0, 1))), axis=-1)
+    share = np.clip((places - ends[0][:2]) @ (way.real, way.imag) / (2 * abs(way) ** 2), 0, 1)
+    room = side**2 * np.mean(1 / (np.sqrt(0.75) * (pitch * (1 - share / 2)) ** 2))
+    assert len(pattern) == pytest.approx(room, rel=0.08)
 
 
 # -- the same every time -------------------------------------------------------------------------------------

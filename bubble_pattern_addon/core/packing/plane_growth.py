@@ -29,6 +29,8 @@ NODES, FEWEST, MOST_NODES = 0.4, 500, 30_000
 STEEP = 0.8
 # From a node to the places round it the pitch does not fall below this share of itself.
 LEAST = 0.3
+# A place that a raster covers is no farther than this from a node, in spacings along each axis.
+BESIDE = 0.501
 # Where a place in the middle of the region is farther than this from all bubbles, in pitches, the lattice
 # has not come there, as beyond a neck, and another is begun.
 LEFT_OUT = 1.9
@@ -155,6 +157,13 @@ def _nodes(raster: Raster, at: Complex) -> tuple[Ints, Complex]:
     line = np.clip(np.rint(place.imag), 0, len(raster.pitch) // raster.columns - 1)
     node = (line * raster.columns + column).astype(np.int64)
     return node, raster.spacing * (place - (column + 1j * line))
+
+
+def _covered(raster: Raster, off: Complex) -> Bools:
+    """Which places the raster covers, by their ways (n,) from the nearest nodes: it reaches as far as the
+    region does, and no slope says anything about what is beyond.
+    """
+    return np.maximum(np.abs(off.real), np.abs(off.imag)) <= BESIDE * raster.spacing
 
 
 def _pitch_near(raster: Raster, node: Ints, off: Complex) -> Floats:
@@ -294,7 +303,9 @@ def _proposals(raster: Raster, crowd: _Crowd, front: Front) -> tuple[Complex, Co
     length = np.repeat(front.pitch, 6) / (1 - np.clip(_dot(way, slope), -STEEP, STEEP) / 2)
     at = np.repeat(front.at, 6) + way * length
     node, off = _nodes(raster, at)
-    inside = np.flatnonzero(raster.inside[node] + _dot(raster.inward[node], off) > 0)
+    inside = np.flatnonzero(
+        (raster.inside[node] + _dot(raster.inward[node], off) > 0) & _covered(raster, off)
+    )
     at, heading = at[inside], (way * bend)[inside]
     local = _pitch_near(raster, node[inside], off[inside])
     free = crowd.free(at, CROWDED * local)
