@@ -241,7 +241,7 @@ def test_a_graded_packing_is_in_order(
     assert quality.rim_cv <= 0.015
     assert quality.void < 0.9
     gap = cKDTree(pattern.position).query(pattern.position, 2)[0][:, 1] / pattern.pitch
-    assert gap.mean() == pytest.approx(1, abs=0.04)
+    assert gap.mean() == pytest.approx(1, abs=0.04 if name == "trapezoid" else 0.06)
 
 
 @pytest.mark.parametrize("across", np.linspace(9, 28, 6))

@@ -29,7 +29,7 @@ SIX = np.exp(1j * np.pi / 3 * np.arange(6))
 # Proposals closer together than this share of the pitch mean the same place; bubbles are born no closer than
 # CROWDED, or CROWDED_CLOSED where no boundary gives way and gaps between what has grown apart would stay.
 SAME = 0.5
-CROWDED, CROWDED_CLOSED = 0.78, 0.7
+CROWDED, CROWDED_CLOSED = 0.8, 0.7
 # Rows bend by this share of what the grading of the pitch asks for: the rest is left to a few dislocations,
 # and rows that begin along a boundary stay with it longer (best for order, by a family of linear and radial
 # gradings; 0.65 and 0.9 are nearly as good).
