@@ -11,19 +11,23 @@ import sys
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
+from math import hypot
 from pathlib import Path
 from types import ModuleType
 
 import bmesh
 import bpy
+from mathutils import Euler, Vector
 
 sys.path.append(str(Path(__file__).parent))
 
-from parts import euler, is_closed, sheet
+from parts import euler, height, is_closed, sheet
 
 bpy.context.preferences.view.show_splash = False
 picture, answer = sys.argv[sys.argv.index("--") + 1 :]
 found: dict[str, object] = {"drawn": 0}
+ROUND = 0.08
+"""Radius of the region, in metres."""
 
 
 def drawn(_panel: bpy.types.Panel, _context: bpy.types.Context) -> None:
@@ -58,10 +62,23 @@ def dome() -> bpy.types.Object:
     for old in list(bpy.data.objects):
         bpy.data.objects.remove(old)
     base = sheet(cells=40)
+    for vertex in base.data.vertices:
+        vertex.co.xy = rounded(*vertex.co.xy)
+        vertex.co.z = height(vertex.co.x, vertex.co.y, 0.2)
     base.data.shade_smooth()
     base.modifiers.new("Wall", 'SOLIDIFY').thickness = 0.003
     bpy.ops.object.modifier_apply(modifier="Wall")
     return base
+
+
+def rounded(x: float, y: float) -> tuple[float, float]:
+    """Where a vertex of a square grid, 0.2 across, goes so that the rings of its faces up to ROUND are round
+    and those beyond become square again.
+    """
+    ring, away = max(abs(x), abs(y)), hypot(x, y)
+    round_as = min(1.0, (0.1 - ring) / (0.1 - ROUND))
+    share = round_as * ring / away + 1 - round_as if away else 1.0
+    return share * x, share * y
 
 
 def front_selected(base: bpy.types.Object) -> None:
@@ -71,7 +88,7 @@ def front_selected(base: bpy.types.Object) -> None:
         bpy.ops.mesh.select_mode(type='FACE')
     mesh = bmesh.from_edit_mesh(base.data)
     for face in mesh.faces:
-        face.select_set(face.normal.z > 0.5 and face.calc_center_median().xy.length < 0.08)
+        face.select_set(face.normal.z > 0.5 and face.calc_center_median().xy.length < ROUND)
     bmesh.update_edit_mesh(base.data)
 
 
@@ -83,6 +100,11 @@ def looked_at(base: bpy.types.Object) -> None:
         bpy.context.view_layer.objects.active = base
         base.select_set(True)
         bpy.ops.view3d.view_selected()
+    shown = view().spaces.active.region_3d
+    shown.view_rotation = Euler((0.75, 0.0, 0.45)).to_quaternion()
+    # what the sidebar covers is no room for the part
+    shown.view_location = shown.view_rotation @ Vector((0.03, 0.0, 0.0))
+    shown.view_distance *= 0.9
 
 
 def tab() -> Iterator[float]:

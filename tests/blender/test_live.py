@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 bpy = pytest.importorskip("bpy", reason="needs the bpy module: python scripts/test.py --blender VERSION")
 
@@ -445,11 +446,10 @@ def test_a_run_tells_bubbles_that_settle(pattern: bpy.types.Object) -> None:
     # they come to rest, where the pattern then is
     final = shots[-1][1].position
     strides = [
-        np.abs(one.position - other.position).max()
+        cKDTree(one.position).query(other.position)[0].mean()  # some come and go between two rounds
         for one, other in pairwise(packing)
-        if len(one.position) == len(other.position)
     ]
-    assert strides[-1] < strides[0]
+    assert strides[-1] < strides[0] / 2
     assert len(final) == pytest.approx(len(points(pattern)), rel=0.02)
 
 
