@@ -10,7 +10,7 @@ from ..mesh import Bools, Floats, Ints
 from ..surface import Spots, positions, to_frame, walk
 from .bubbles import Ground, joined
 from .crowding import close_pairs, uncrowded
-from .rim import CLOSEST, FirstRow, on_track, spots_on_track
+from .rim import CLOSEST, FirstRow, on_track
 
 # Two rows of a hexagonal arrangement are this far apart, in pitches; nearer lines have room for one row.
 ROW_DISTANCE = 0.85
@@ -29,27 +29,27 @@ TOO_CLOSE = 0.8
 SMALL_LOOP = 2.6
 
 
-def in_the_narrows(ground: Ground, row: FirstRow) -> tuple[FirstRow, Spots]:
-    """The first row without those in narrow places, and places in the middle for these.
+def in_the_narrows(ground: Ground, row: FirstRow, spots: Spots) -> tuple[Spots, Spots]:
+    """Of the first row, at `spots`, those that are not in narrow places, and places in the middle for these.
 
     A place is narrow where the inset line comes back, in the other direction, nearer than two rows are apart.
     A single row runs along the middle there; a bubble alone in its part of the region stands in that middle.
     """
     nobody = Spots(np.empty(0, dtype=np.int64), np.empty((0, 3)))
     if not len(row.arc):
-        return row, nobody
-    spots = spots_on_track(ground.charts, ground.track, row.arc)
+        return spots, nobody
     aside = _to_the_middle(ground, row, spots)
     narrow = ~np.isnan(aside[:, 0])
     if not narrow.any():
-        return row, nobody
+        return spots, nobody
     start = spots.take(narrow)
     middle = walk(ground.charts, start, to_frame(ground.charts, start.row, aside[narrow])).arrived
     clear = _keeps_clear(ground, middle)
     if not clear.any():
-        return row, nobody
+        return spots, nobody
     narrow[narrow] = clear
-    return row.take(~narrow), _evened(ground, row, _moved(spots, narrow, middle.take(clear)), narrow)
+    middles = _evened(ground, row, _moved(spots, narrow, middle.take(clear)), narrow)
+    return spots.take(~narrow), middles
 
 
 def _moved(spots: Spots, which: Bools, there: Spots) -> Spots:

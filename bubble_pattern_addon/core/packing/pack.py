@@ -90,8 +90,9 @@ def pack_steps(region: Region, packing: Packing) -> Steps[tuple[Ground, Bubbles]
         finding = find_symmetry(charts, ground.boundary, ground.pitch, *asked)
         ground = replace(ground, symmetry=finding.symmetry, notes=finding.notes)
     row = first_row(ground.track, loop_starts(ground))
-    along, between = in_the_narrows(ground, _without_conflicts(ground, row))
-    first = spots_on_track(charts, ground.track, along.arc) if len(along.arc) else _nobody()
+    spots = spots_on_track(charts, ground.track, row.arc) if len(row.arc) else _nobody()
+    apart = _without_conflicts(ground, row, spots)
+    first, between = in_the_narrows(ground, row.take(apart), spots.take(apart))
     fixed, inner = with_pins(ground, first, between)
     ground, bubbles = yield from _filled(ground, fixed, packing)
     return ground, replace(bubbles, inner=inner)
@@ -295,15 +296,16 @@ def _where(charts: Charts, spots: Spots, reach: float) -> Floats:
     return signature(charts.region, positions(charts, spots), spots.row, reach)
 
 
-def _without_conflicts(ground: Ground, row: FirstRow) -> FirstRow:
-    """The first row less those too close, as across a neck or in an acute corner; corners go last."""
+def _without_conflicts(ground: Ground, row: FirstRow, spots: Spots) -> Bools:
+    """Which of the first row, at `spots`, stay: not those too close to others, as across a neck or in an
+    acute corner; corners go last.
+    """
     if not len(row.arc):
-        return row
-    spots = spots_on_track(ground.charts, ground.track, row.arc)
+        return row.corner
     local = ground.pitch(spots)
     pairs = close_pairs(_where(ground.charts, spots, float(local.max())), TOO_CLOSE * local)
     rank = np.lexsort((np.arange(len(local)), ~row.corner)).argsort()
-    return row.take(uncrowded(pairs, rank))
+    return uncrowded(pairs, rank)
 
 
 def _lattice(ground: Ground, seeds: Spots, directions: Complex) -> Steps[Spots]:

@@ -104,8 +104,10 @@ def relax_steps(
     if moving is not None:
         everyone[: len(bubbles)] &= moving
     links = links_of(swarm, np.flatnonzero(everyone))
-    # Bubbles of a graded start move much, and listing their pairs anew costs more than a step of theirs.
-    beyond = SKIN / 2 if ground.uniform is not None else UNSEEN
+    # Listing pairs anew costs more than a step. Only round a bend it is done early: who hardly moves may come
+    # much nearer there.
+    bent = ground.uniform is not None and not ground.charts.region.flat
+    beyond = SKIN / 2 if bent else UNSEEN
     looked_at_all, done = True, 0
     while done < iterations:
         pull = pull_on(swarm, links, law)
