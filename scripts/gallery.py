@@ -218,3 +218,7 @@ def write_jpeg(path: Path, pixels: Floats, quality: int) -> None:
         image.save(filepath=str(path), quality=quality)
     finally:
         bpy.data.images.remove(image)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

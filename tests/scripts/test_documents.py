@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
+
+import pytest
 
 from bubble_pattern_addon.core.field_tables import KINDS
 from bubble_pattern_addon.core.field_tables import READERS as FIELD_READERS
@@ -32,6 +36,15 @@ def test_every_link_of_the_readme_leads_somewhere() -> None:
     links = [link for link in re.findall(r"\]\(([^)]+)\)", README) if "://" not in link]
     assert links
     assert [link for link in links if not (ROOT / link).exists()] == []
+
+
+@pytest.mark.parametrize("script", sorted(set(re.findall(r"python3 (scripts/\w+\.py)", README))))
+def test_every_script_of_the_readme_can_be_called(script: str) -> None:
+    done = subprocess.run(
+        [sys.executable, str(ROOT / script), "--help"], capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0
+    assert done.stdout.startswith(f"usage: {Path(script).name}")
 
 
 def test_pictures_are_small() -> None:
