@@ -28,7 +28,9 @@ from scripts.shapes import SHAPES, Shape, circle, rectangle_outline, trapezoid_o
 
 @dataclass(frozen=True)
 class Row:
-    """One line of a packing table. edge: least centre to boundary in pitches; mirror: see `mirrored`."""
+    """One line of a packing table. known: seconds where the region has been read before; ratio, known_ratio:
+    of either to a peer's; edge: least centre to boundary in pitches; mirror: see `mirrored`.
+    """
 
     region: str
     method: str
@@ -38,10 +40,13 @@ class Row:
     edge: float
     mirror: float
     ratio: float | None = None
+    known: float = np.nan
+    known_ratio: float | None = None
 
 
+READING = "From the mesh and the selection to the finished pattern; known: the region has been read before."
 FIGURES = "six | ψ6 | gap CV | gap min | rim CV | void"
-HEAD = f"| region | method | n | seconds | ratio | {FIGURES} | edge | mirror |"
+HEAD = f"| region | method | n | seconds | ratio | known, s | ratio | {FIGURES} | edge | mirror |"
 
 
 def print_rows(rows: Iterable[Row]) -> None:
@@ -50,6 +55,7 @@ def print_rows(rows: Iterable[Row]) -> None:
         q = row.quality
         figures = [
             *(number(row.seconds, 3), "" if row.ratio is None else f"**{row.ratio:.2f}**"),
+            *(number(row.known, 3), "" if row.known_ratio is None else f"**{row.known_ratio:.2f}**"),
             *(number(value, 3) for value in (q.six, q.psi6, q.gap_cv, q.gap_min)),
             *(number(q.rim_cv, 4), number(q.void, 3), number(row.edge, 4), number(row.mirror, 2)),
         ]
@@ -109,21 +115,27 @@ def against(
 ) -> int:
     """Our packing and a peer at the same count in turn; prints both rows, returns our count."""
     pattern, region, _ = pack(shape, pitch)
-    runs = [lambda: pack(shape, pitch)[2]]
+    runs: list[Callable[[], float]] = [
+        lambda: pack(shape, pitch)[2],
+        partial(packed_in, region, uniform(pitch)),
+    ]
     if arrange is None:
-        print_rows([our_row(name, pattern, region, pitch, in_turn(runs, repeats)[0])])
+        ours, known = in_turn(runs, repeats)
+        print_rows([replace(our_row(name, pattern, region, pitch, ours), known=known)])
         return len(pattern)
     found = peers.at_count(arrange, pitch, len(pattern))
     runs.append(lambda: arrange(found.spacing).seconds)
-    ours, theirs = in_turn(runs, repeats)
+    ours, known, theirs = in_turn(runs, repeats)
     row = our_row(name, pattern, region, pitch, ours)
-    print_rows([replace(row, ratio=ours / theirs), peer_row(name, method, found, region, theirs)])
+    row = replace(row, ratio=ours / theirs, known=known, known_ratio=known / theirs)
+    print_rows([row, peer_row(name, method, found, region, theirs)])
     return len(pattern)
 
 
 def flat(repeats: int) -> None:
     """Flat regions against gmsh, the clipped grid and Lloyd's relaxation."""
-    print("\n## Packing, flat\n\nOur trapezoid is a coarse n-gon; gmsh has true arcs, half a pitch in.")
+    print(f"\n## Packing, flat\n\n{READING}")
+    print("Our trapezoid is a coarse n-gon; gmsh is given true arcs, half a pitch in, before its clock runs.")
     print_head(HEAD)
     gmsh = installed("gmsh")
     trapezoid = SHAPES["trapezoid"]()
@@ -150,9 +162,8 @@ def flat(repeats: int) -> None:
 
 def curved(repeats: int) -> None:
     """Curved regions against Instant Meshes."""
-    print(
-        "\n## Packing, curved\n\nInstant Meshes has its first row on the boundary, ours is half a pitch in."
-    )
+    print(f"\n## Packing, curved\n\n{READING}")
+    print("Instant Meshes has its first row on the boundary, ours is half a pitch in; it reads the mesh too.")
     print_head(HEAD)
     there = installed("pynanoinstantmeshes")
     for name, pitch in (("panel", 6.5), ("panel", 2.05), ("sphere", 6.0)):
