@@ -43,6 +43,9 @@ ON_TOP, ASIDE, GOLDEN = 0.05, 0.1, 2.399963
 AROUND, PUSH = 2.5, 2.0
 # No bubble becomes larger than so many pitches, however many are deleted.
 MOST_STRETCH = 1.15
+# Gaps are evened out in so many rounds at most, until no bubble moves by more pitches in one. A crowd that
+# moves no more from the outset is in balance already: who settles twice must not see the pattern wander.
+EVENING, AT_REST = 12, 0.02
 # Where no bubble is within so many pitches of the first row's track, it lacks one.
 LACKING = 0.8
 
@@ -229,26 +232,40 @@ def _relaxed(ground: Ground, crowd: _Crowd, recipe: Recipe, gaps: Floats, fill_v
     packing = recipe.packing
     crowd = _taken(crowd, np.argsort(crowd.free, kind="stable"))
     fixed = int((~crowd.free).sum())
-    room = np.zeros(len(crowd.ids))
+    if not fill_voids and not len(gaps):
+        evened, moved = _evened(ground, crowd, fixed, gaps, packing.tolerance)
+        if moved <= AT_REST:
+            return evened
     for number in range(len(ROUNDS)):
         yield Progress("Settling the bubbles", 0.2 + 0.2 * number)
-        size, room = _sizes(ground, crowd, gaps)
+        size, _ = _sizes(ground, crowd, gaps)
         bubbles, _ = relax(ground, Bubbles(crowd.spots, fixed), size, packing.iterations, packing.tolerance)
         crowd = replace(crowd, spots=_inside(ground, bubbles.spots, crowd.free))
         if fill_voids:
             voids = voids_among(ground, crowd.spots, ground.pitch(crowd.spots))
             crowd = _grown(crowd, voids, False)
-    yield Progress("Evening out the gaps", 0.8)
-    for _ in range(2):
-        size, room = _sizes(ground, crowd, gaps)
-        bubbles = Bubbles(crowd.spots, fixed)
-        stiffness = 1.0 + STIFFNESS
-        bubbles, _ = relax(ground, bubbles, size, STIFF_STEPS, packing.tolerance, stiff_law, stiffness)
-        spots = _inside(ground, bubbles.spots, crowd.free)
-        crowd = replace(crowd, spots=spots)
-        if spots is bubbles.spots:
+    for number in range(EVENING):
+        yield Progress("Evening out the gaps", 0.8 + 0.15 * number / EVENING)
+        crowd, moved = _evened(ground, crowd, fixed, gaps, packing.tolerance)
+        if moved <= AT_REST:
             break
+    _, room = _sizes(ground, crowd, gaps)
     return replace(crowd, stretch=np.minimum(crowd.stretch * room, MOST_STRETCH))
+
+
+def _evened(
+    ground: Ground, crowd: _Crowd, fixed: int, gaps: Floats, tolerance: float
+) -> tuple[_Crowd, float]:
+    """The crowd, its first `fixed` in place, after a round of the stiff law; and by how many of its pitches
+    the bubble moved that moved most.
+    """
+    size, _ = _sizes(ground, crowd, gaps)
+    bubbles, stiffness = Bubbles(crowd.spots, fixed), 1.0 + STIFFNESS
+    bubbles, _ = relax(ground, bubbles, size, STIFF_STEPS, tolerance, stiff_law, stiffness)
+    spots = _inside(ground, bubbles.spots, crowd.free)
+    step = positions(ground.charts, spots) - positions(ground.charts, crowd.spots)
+    moved = np.linalg.norm(step, axis=1) / size
+    return replace(crowd, spots=spots), float(moved.max(initial=0.0))
 
 
 def _sizes(ground: Ground, crowd: _Crowd, gaps: Floats) -> tuple[Floats, Floats]:

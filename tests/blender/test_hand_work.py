@@ -272,4 +272,16 @@ def test_settled_pattern_is_saved_and_follows_its_base(tmp_path: Path) -> None:
     activate(pattern)
     bpy.ops.object.mode_set(mode='EDIT')
     assert bpy.ops.bubble_pattern.settle() == {'FINISHED'}
-    assert np.abs(shown(pattern) - [1, 2, 3] - before).max() < 0.1 * PITCH
+    assert np.abs(shown(pattern) - [1, 2, 3] - before).max() < 0.03 * PITCH
+
+
+@pytest.mark.parametrize(("x", "y", "by"), [(0.003, 0.002, 0.001), (0.01, -0.01, 0.002)])
+def test_who_settles_again_changes_nothing(x: float, y: float, by: float) -> None:
+    pattern = editing()
+    select(pattern, nearest(pattern, x, y))
+    bpy.ops.bubble_pattern.pin()
+    bpy.ops.transform.translate(value=(by, 0.0, 0.0))
+    bpy.ops.bubble_pattern.settle()
+    before = shown(pattern)
+    bpy.ops.bubble_pattern.settle()
+    assert np.abs(shown(pattern) - before).max() < 0.03 * PITCH
