@@ -2,7 +2,8 @@
 
 Ours and its peer run in turn, so that a busy machine slows both; a ratio is ours by the peer's. Seconds are
 medians in packing, and the least in adding, whose peers work on all cores and suffer most from a busy one.
-Peers come with the extra `benchmark`; one that is not installed is left out with a line that says so.
+Peers come with the extra `benchmark`; one that is not installed is left out with a line that says so. Where
+this Python lacks what the core needs, the project's own environment is taken, peers and all.
 
 Example: python scripts/benchmark.py --only flat curved
 """
@@ -15,6 +16,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from scripts import environment
+
+if __name__ == "__main__":
+    environment.enter_for_lack_of(environment.CORE, "benchmark")
 
 from scripts.benchmark_adding import add_once, adding, blender
 from scripts.benchmark_packing import curved, flat, graded, pack_once

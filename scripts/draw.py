@@ -10,10 +10,14 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import matplotlib
-import numpy as np
-
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from scripts import environment
+
+if __name__ == "__main__":
+    environment.enter_for_lack_of(environment.CORE, "benchmark")
+
+import numpy as np
 
 from bubble_pattern_addon.core.distance import boundary_distance
 from bubble_pattern_addon.core.mesh import Floats, Ints
@@ -21,8 +25,6 @@ from bubble_pattern_addon.core.neighbours import neighbours
 from bubble_pattern_addon.core.quality import Quality, measure_points
 from scripts.benchmark_packing import pack
 from scripts.shapes import SHAPES
-
-matplotlib.use("Agg")
 
 COLOURS = ["#08306b", "#08519c", "#2171b5", "#4292c6", "#6baed6", "#9ecae1", "#d9d9d9", "#fb6a4a", "#a50f15"]
 """By number of neighbours, 0 to 8 and more: six is grey, fewer blue, more red."""
@@ -49,7 +51,7 @@ def draw(
     (S, 2, 3). Bubbles facing away from the viewer are left out. pixels: the picture's longer side.
     labels: write the bubbles' numbers.
     """
-    import matplotlib.pyplot as plt
+    from matplotlib.figure import Figure
 
     if position.shape[1] == 2:
         position = np.column_stack([position, np.zeros(len(position))])
@@ -66,7 +68,8 @@ def draw(
     right, up, towards = _camera(np.asarray(view, float))
     shown = np.flatnonzero(normal @ towards > 0.02)
     shown = shown[np.argsort(position[shown] @ towards)]
-    figure, axes = plt.subplots(figsize=(10, 10), layout="constrained")
+    figure = Figure(figsize=(10, 10), layout="constrained")
+    axes = figure.subplots()
     flat = np.stack([segments @ right, segments @ up], axis=-1)
     _add_bubbles(axes, position, normal, diameter, (right, up), shown, count, interior, row)
     _add_lines(axes, flat)
@@ -80,7 +83,6 @@ def draw(
     axes.set_title(f"{title} {_words(n, quality)}".strip(), fontsize=10)
     _fit(figure, axes)
     figure.savefig(path, dpi=pixels / 10)
-    plt.close(figure)
     return quality
 
 
@@ -105,6 +107,7 @@ def _add_bubbles(
 ) -> None:
     """Discs in their tangent planes; pale where not interior, as their number of neighbours means nothing."""
     from matplotlib.collections import PolyCollection
+    from matplotlib.colors import to_rgba
 
     right, up = screen
     angle = np.linspace(0, 2 * np.pi, 25)[:-1]
@@ -114,7 +117,7 @@ def _add_bubbles(
     ring = np.cos(angle)[:, None] * first[:, None] + np.sin(angle)[:, None] * second[:, None]
     rings = position[:, None] + ring * diameter[:, None, None] / 2
     polygons = np.stack([rings @ right, rings @ up], axis=-1)[shown]
-    faces = np.array([matplotlib.colors.to_rgba(colour) for colour in COLOURS])[np.minimum(count, 8)]
+    faces = np.array([to_rgba(colour) for colour in COLOURS])[np.minimum(count, 8)]
     faces[~interior] = [0.95, 0.95, 0.88, 1.0]
     edge = np.where((row == 0)[:, None], [0.0, 0.35, 0.0, 1.0], [1.0, 1.0, 1.0, 1.0])
     size = np.where(row == 0, 0.9, 0.3)
@@ -165,6 +168,7 @@ def main() -> None:
     parser.add_argument("--pixels", type=int, default=1600)
     parser.add_argument("-o", "--output", type=Path, required=True)
     chosen = parser.parse_args()
+    environment.enter_for_lack_of(["matplotlib"], "benchmark")
     shape = SHAPES[chosen.shape]()
     pitch = chosen.pitch or shape.pitch
     pattern, region, seconds = pack(shape, pitch)

@@ -24,6 +24,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -31,6 +32,7 @@ PYPROJECT = ROOT / "pyproject.toml"
 
 # the Python that each Blender version's module is built for; newest last
 BLENDERS = {"4.5": "3.11", "5.0": "3.11", "5.1": "3.13", "5.2": "3.13"}
+CORE = ("numpy", "scipy", "trimesh", "manifold3d")  # the modules that the core runs on
 GROUPS = ("scripts", "blender", "test", "lint")
 
 # shared libraries that the Blender module asks of a Linux system, and the packages that bring them
@@ -359,6 +361,12 @@ def enter(*groups: str, blender: str | None = None) -> None:
     if os.name == "nt":  # os.exec there returns to the shell at once
         sys.exit(subprocess.call(command))
     os.execv(command[0], command)
+
+
+def enter_for_lack_of(modules: Sequence[str], *groups: str) -> None:
+    """`enter` with these groups where this Python lacks one of the modules; else go on in it."""
+    if any(find_spec(module) is None for module in modules):
+        enter(*groups)
 
 
 def borrow(libraries: Sequence[str]) -> None:

@@ -180,7 +180,7 @@ def long_update(pattern: bpy.types.Object) -> Iterator[float]:
     settings, stepping, runs = pattern.bubble_pattern, module("stepping"), module("runs")
     before, pitch = settings.count, settings.pitch
     settings.live = False
-    settings.pitch = pitch / 4
+    settings.pitch = pitch / 7  # far longer than any machine takes for what follows
     kept = stepping.PATIENCE, stepping.SLICE, stepping.LONGEST_SLICE
     stepping.PATIENCE = stepping.SLICE = stepping.LONGEST_SLICE = 0.0  # one step at a time
     found["long update"] = sorted(pressed("update"))
@@ -195,13 +195,18 @@ def long_update(pattern: bpy.types.Object) -> Iterator[float]:
     distance = shown.view_distance
     place = region('WINDOW')
     (window,) = bpy.context.window_manager.windows
-    for kind in ('WHEELUPMOUSE', 'X', 'RIGHTMOUSE'):
+
+    def tapped(kind: str) -> None:
         for value in ('PRESS', 'RELEASE'):
             window.event_simulate(type=kind, value=value, x=place.x + 200, y=place.y + 200)
-        yield 1.0
-        if kind == 'X':
-            found["zoomed while packing"] = shown.view_distance != distance
-            found["still packing"] = runs.under_way() is not None
+
+    tapped('WHEELUPMOUSE')
+    yield from until(lambda: shown.view_distance != distance)
+    tapped('X')
+    yield 1.0
+    found["still packing"] = runs.under_way() is not None
+    tapped('RIGHTMOUSE')
+    yield from until(lambda: runs.under_way() is None)
     found["after the right click"] = [runs.under_way() is None, settings.count == before, pattern.name]
     stepping.PATIENCE, stepping.SLICE, stepping.LONGEST_SLICE = kept
     settings.pitch = pitch
@@ -268,7 +273,7 @@ def asking() -> Iterator[float]:
     yield from photo("3-asked")
     for value in ('PRESS', 'RELEASE'):
         window.event_simulate(type='ESC', value=value)
-    yield 0.5
+    yield 1.0
     found["moved after Esc"] = module("hand_state").by_hand(the_pattern()).moved
     with inside('UI'):
         bpy.ops.bubble_pattern.update()

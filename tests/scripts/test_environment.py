@@ -120,3 +120,12 @@ def test_a_failed_set_up_is_tried_again(tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.setattr(environment, "_install", lambda folder, packages: done.append(folder))
     environment.prepare()
     assert done
+
+
+def test_a_python_that_has_all_is_stayed_in(monkeypatch: pytest.MonkeyPatch) -> None:
+    entered: list[tuple[str, ...]] = []
+    monkeypatch.setattr(environment, "enter", lambda *groups: entered.append(groups))
+    environment.enter_for_lack_of(environment.CORE, "benchmark")
+    assert entered == []
+    environment.enter_for_lack_of([*environment.CORE, "no_such_module"], "benchmark")
+    assert entered == [("benchmark",)]
