@@ -8,7 +8,8 @@ and bisected.
 By the pitch every trial is a packing. The count goes with 1 / pitch^2 but for what the boundary takes; the
 first trial starts from the region's area, each next one from what was found (a fit while all are on one side
 of the target, regula falsi between two sides). A count is a whole number and jumps, so near the target
-neighbouring pitches are tried in turn until one is within a feature.
+neighbouring pitches are tried in turn until one is within a feature. Along straight edges it jumps by a whole
+row, over the target too; then the search begins again with a lattice that starts elsewhere, the next seed.
 """
 
 from __future__ import annotations
@@ -45,9 +46,12 @@ TRIALS = 60
 # packings; after the most of them the nearest one is taken whatever it is.
 PATIENCE = 8
 MOST_PACKINGS = 16
+# So many seeds are tried, the recipe's own first.
+SEEDS = 4
 # Least steps of the pitch, as shares of it, when neighbouring pitches are tried in turn; where few features
 # are wanted they are as wide as gives about one feature more or less.
 TINY = 4e-4
+SEEDED = "The lattice starts elsewhere, as seed {seed} says: with the seed given no pitch comes as near."
 # The most that the pitch changes from one trial to the next while the target is far.
 STRIDE = 4.0
 
@@ -56,7 +60,7 @@ STRIDE = 4.0
 class Solved:
     """What was found.
 
-    recipe: with the lengths that were found and no target any more: it gives the pattern again
+    recipe: with the lengths and the seed that were found and no target any more: it gives the pattern again
     wanted, reached: open area or count; factor: times which the diameter or the pitch was taken
     packings, shapings: how often the region was packed, and features were shaped, to find it
     met: within TOLERANCE or one feature
@@ -190,7 +194,48 @@ def _by_pitch(region: Region, recipe: Recipe, surroundings: Surroundings) -> Ste
     target = float(solve.open_area if solve.count is None else solve.count)  # type: ignore[arg-type]
     recipe = replace(recipe, solve=Solve())
     smallest = _smallest_pitch(recipe)
+    smallest = _smallest_pitch(recipe)
     factor = max(_first_factor(region, recipe, surroundings, solve), smallest)
+    own, packings, found = recipe.packing.seed, 0, []
+    for seed in range(own, own + SEEDS):
+        begun = replace(recipe, packing=replace(recipe.packing, seed=seed))
+        share = (seed - own) / SEEDS
+        searching = _searched(region, begun, surroundings, solve, target, (factor, smallest))
+        trials = yield from within(searching, share, share + 1 / SEEDS)
+        packings += len(trials)
+        best = _best(trials, target)
+        if best.pattern is None or (best.factor <= smallest and best.value < target - _slack(best, target)):
+            raise _unreachable(solve, target, best)
+        found.append((abs(best.value - target), seed, begun, best))
+        if abs(best.value - target) <= _slack(best, target):
+            break
+        factor = best.factor
+    off, seed, begun, best = min(found, key=lambda one: one[:2])
+    assert best.pattern is not None  # or it would have been raised
+    met = off <= _slack(best, target)
+    what, reached = f"{target:,.0f} features", f"{best.value:,.0f}"
+    if solve.count is None:
+        what, reached = f"An open area of {target:.2%}", f"{best.value:.2%}"
+    pattern = _with_note(best.pattern, met, what, reached, "pitch")
+    if seed != own:
+        pattern = replace(pattern, notes=(*pattern.notes, SEEDED.format(seed=seed)))
+    repitched = _repitched(begun, best.factor)
+    return Solved(repitched, pattern, "pitch", target, best.value, best.factor, packings, packings, met)
+
+
+def _searched(
+    region: Region,
+    recipe: Recipe,
+    surroundings: Surroundings,
+    solve: Solve,
+    target: float,
+    start: tuple[float, float],
+) -> Steps[list[_Trial]]:
+    """Trials with the recipe's seed, until one is good enough.
+
+    start: the first factor on the pitch, and the smallest that makes sense
+    """
+    factor, smallest = start
     trials: list[_Trial] = []
     while True:
         done = len(trials) / MOST_PACKINGS
@@ -200,22 +245,16 @@ def _by_pitch(region: Region, recipe: Recipe, surroundings: Surroundings) -> Ste
             done + 1 / MOST_PACKINGS,
         )
         trials.append(trial)
-        best = min(trials, key=lambda trial: (abs(trial.value - target), trial.factor))
-        if _good_enough(best, target, len(trials)):
-            break
+        if _good_enough(_best(trials, target), target, len(trials)):
+            return trials
         factor = max(_next_factor(trials, target), smallest)
         if any(abs(factor / trial.factor - 1) < 1e-9 for trial in trials):
-            break
-    if best.pattern is None or (best.factor <= smallest and best.value < target - _slack(best, target)):
-        raise _unreachable(solve, target, best)
-    met = abs(best.value - target) <= _slack(best, target)
-    what, reached = f"{target:,.0f} features", f"{best.value:,.0f}"
-    if solve.count is None:
-        what, reached = f"An open area of {target:.2%}", f"{best.value:.2%}"
-    pattern = _with_note(best.pattern, met, what, reached, "pitch")
-    found = _repitched(recipe, best.factor)
-    packings = len(trials)
-    return Solved(found, pattern, "pitch", target, best.value, best.factor, packings, packings, met)
+            return trials
+
+
+def _best(trials: list[_Trial], target: float) -> _Trial:
+    """The trial that comes nearest to the target."""
+    return min(trials, key=lambda trial: (abs(trial.value - target), trial.factor))
 
 
 def _unreachable(solve: Solve, target: float, best: _Trial) -> RecipeError:

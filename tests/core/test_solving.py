@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bubble_pattern_addon import batch
+from bubble_pattern_addon.core import solving
 from bubble_pattern_addon.core.blending import Blend, Fill, Least, Most, Product, SubRegions
 from bubble_pattern_addon.core.errors import RecipeError, RegionError
 from bubble_pattern_addon.core.fields import Linear, Radial
@@ -177,13 +178,25 @@ def test_the_pitch_meets_the_open_area_with_the_diameters_as_they_are(diameter: 
     assert found.recipe.shaping == asked.shaping
 
 
-def test_a_count_between_two_jumps_is_met_as_nearly_as_it_can_and_told() -> None:
-    """A narrow strip loses or wins a whole row at once."""
-    region = region_of("strip")
-    found = solved(region, recipe(Fill(Constant(0.6)), Constant(0.5), solve=Solve(count=333)))
+@pytest.mark.parametrize(("name", "count"), [("strip", 333), ("square", 317), ("l", 100), ("tube", 100)])
+def test_a_count_between_two_jumps_is_met_by_another_start(
+    name: str, count: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Along straight edges a pattern loses or wins a whole row at once."""
+    region = region_of(name)
+    asked = recipe(Fill(Constant(0.6)), Constant(np.sqrt(region.area) / 20), solve=Solve(count=count))
+    found = solved(region, asked)
+    check(region, asked, found)
+    assert found.met
+    assert found.recipe.packing.seed > 0
+    assert any("starts elsewhere" in note for note in found.pattern.notes)
+
+    monkeypatch.setattr(solving, "SEEDS", 1)
+    found = solved(region, asked)
+    check(region, asked, found)
     assert not found.met
     assert found.packings <= MOST_PACKINGS
-    assert any("333 features can't be met exactly by the pitch" in note for note in found.pattern.notes)
+    assert any(f"{count} features can't be met exactly by the pitch" in note for note in found.pattern.notes)
 
 
 def test_features_that_would_touch_are_told() -> None:
