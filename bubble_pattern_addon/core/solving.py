@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .blending import Fill
 from .errors import RecipeError, RegionError
 from .floors import floors_for
 from .limits import limited_by
@@ -134,12 +135,14 @@ def _by_diameter(region: Region, recipe: Recipe, surroundings: Surroundings) -> 
 
 def _largest_factor(recipe: Recipe, pitch: Floats, wished: Floats) -> float:
     """How much larger the diameters may be asked for: a recipe with one pitch and one diameter refuses those
-    that leave no web; of graded ones, until every single feature fills its place.
+    that leave no web, and so does one with a share of the pitch; of other graded ones, until every single
+    feature fills its place.
     """
-    diameter = uniform_diameter(recipe)
+    diameter, size = uniform_diameter(recipe), recipe.shaping.diameter
     whole = recipe.packing.pitch
     if diameter is None or not isinstance(whole, Constant):
-        return float((2 * pitch / wished).max())
+        most = size.share.bounds()[1] if isinstance(size, Fill) else np.inf
+        return min(float((2 * pitch / wished).max()), (1 - LEAST_WEB) / most if np.isfinite(most) else np.inf)
     web = max(recipe.limits.min_web, LEAST_WEB * whole.value)
     most = min(whole.value - web, whole.value + 2 * recipe.packing.edge_offset)
     return most * (1 - 1e-6) / diameter
