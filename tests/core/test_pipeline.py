@@ -111,7 +111,7 @@ def check_invariants(region: Region, pattern: Pattern, pitch: float, edge_offset
         assert distance.min() >= (0.5 - 1e-2) * pitch + edge_offset
         # Where there is no room for two rows a single one runs along the middle.
         for point in pattern.position[pattern.row == 0][first > 0.52 * pitch + edge_offset]:
-            assert between_two_sides(region, point, 0.95 * pitch + edge_offset)
+            assert between_two_sides(region, point, pitch + edge_offset)
     else:
         assert (pattern.row == -1).all()
 
