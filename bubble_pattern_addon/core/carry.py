@@ -72,16 +72,15 @@ def drift(part: Mesh, face: Ints, named: Ints, changed: Ints, base: Mesh) -> flo
 
     face: (F,) triangle of the base each of the first triangles of the part lies on; named: (V',) vertex of
     the base at each of the part's, below 0 for new ones. The largest of: how far the pieces' corners lie off
-    the face's plane, the width of what they miss of its area or add to it, and the width of a face without
-    any piece. Infinite where a piece has a corner that is not the base's.
+    the face's plane, the width of what they miss of its area or add to it, the width of a face without any
+    piece, and how far a corner that is not the base's is from the face's own: where a rim goes right through
+    a corner of the base, the boolean may put the rim's corner in its place, a last bit beside it.
     """
     asked = np.full(len(base.triangles), -1)
     asked[changed] = np.arange(len(changed))
     piece = np.flatnonzero(asked[face] >= 0)
     owner = asked[face[piece]]
     pieces, faces = Mesh(part.vertices, part.triangles[piece]), Mesh(base.vertices, base.triangles[changed])
-    if np.any(named[pieces.triangles] < 0):
-        return np.inf
     plane, corners = faces.area_vectors, faces.corners
     area = np.linalg.norm(plane, axis=1)
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
@@ -91,7 +90,9 @@ def drift(part: Mesh, face: Ints, named: Ints, changed: Ints, base: Mesh) -> flo
     normal = plane / np.where(area > 0, area, 1)[:, None]
     offset = pieces.corners - corners[owner, :1]
     off = np.abs(np.einsum("mck,mk->mc", offset, normal[owner]))
-    return float(max(width.max(initial=0), off.max(initial=0)))
+    away = np.linalg.norm(pieces.corners[:, :, None] - corners[owner][:, None], axis=3).min(axis=2)
+    new = away[named[pieces.triangles] < 0]
+    return float(max(width.max(initial=0), off.max(initial=0), new.max(initial=0)))
 
 
 def carry_corners(base: Mesh, part: Mesh, source: Ints, values: Floats) -> Floats:

@@ -109,9 +109,10 @@ def check_invariants(region: Region, pattern: Pattern, pitch: float, edge_offset
     first = distance[pattern.row == 0]
     if len(region.boundary_segments):
         assert distance.min() >= (0.5 - 1e-2) * pitch + edge_offset
-        # Where there is no room for two rows a single one runs along the middle.
-        for point in pattern.position[pattern.row == 0][first > 0.52 * pitch + edge_offset]:
-            assert between_two_sides(region, point, pitch + edge_offset)
+        # Where there is no room for two rows a single one runs along the middle, and evenly on from there to
+        # where there is.
+        for point in pattern.position[pattern.row == 0][first > 0.56 * pitch + edge_offset]:
+            assert between_two_sides(region, point, 1.25 * pitch + edge_offset)
     else:
         assert (pattern.row == -1).all()
 
@@ -405,6 +406,28 @@ def test_any_plate_keeps_the_laws(plate: tuple[list[Floats], float], triangles: 
     part = drive(part_steps(solid, pattern, Feature(sides=16)))
     assert part.check.problems == ()
     assert (part.check.base_euler, part.check.euler) == (base_euler, base_euler - 2 * len(pattern))
+
+
+def test_a_rim_right_through_a_corner_of_the_base_harms_no_face() -> None:
+    """The boolean then has the rim's corner in place of the base's, a last bit beside it."""
+    angle = np.arange(3) * 2 * np.pi / 3
+    corners = 14.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    sheet = shapes.fine_sheet([corners, shapes.circle(1.0, (0.0, 1.0), 48)[::-1]], 1.3)
+    solid = shapes.slab(sheet, 1.0)
+    _, pattern = lay(solid, np.arange(len(solid.triangles)) < len(sheet.triangles), uniform(4.0))
+    part = drive(part_steps(solid, pattern, Feature(sides=16)))
+    assert part.check.unchanged
+    assert part.check.problems == ()
+
+
+def test_a_single_row_keeps_clear_of_the_first_row_beside_it() -> None:
+    """An island so near to the edge that one row fits between, and the rows of both sides meet there."""
+    angle = 0.75 + np.arange(3) * 2 * np.pi / 3
+    corners = 14.0 * np.stack([2.25 * np.cos(angle), np.sin(angle)], axis=1)
+    sheet = shapes.coarse_sheet([shapes.rounded(corners, 5.0, 12), shapes.circle(1.0, (0.0, 0.0), 48)[::-1]])
+    _, pattern = lay(sheet, np.ones(len(sheet.triangles), dtype=bool), uniform(4.0))
+    assert min_web(pattern) > 0.05 * 4.0
+    assert not len(pattern.shrunk)
 
 
 # -- sub-regions ---------------------------------------------------------------------------------------------

@@ -23,7 +23,8 @@ OWN_SIDE = 0.45
 KNOTS = 48
 # A run whose neighbours are farther apart than this, in pitches, is no single row.
 FARTHEST = 1.9
-# Single rows that meet, as at a crossing of narrow places, keep this far apart, in pitches.
+# Single rows that meet, as at a crossing of narrow places, keep this far apart, in pitches; and as far from
+# the first row of wider places.
 TOO_CLOSE = 0.8
 # A closed line of fewer pitches has no room for two bubbles across.
 SMALL_LOOP = 2.6
@@ -81,11 +82,13 @@ def _evened(ground: Ground, row: FirstRow, spots: Spots, narrow: Bools) -> Spots
             ]
     found = joined(*placed) if placed else spots.take(np.zeros(0, dtype=np.int64))
     found = found.take(_keeps_clear(ground, found))
-    if not len(found.row):
-        return found
-    pitch = ground.pitch(found)
-    where = signature(ground.charts.region, positions(ground.charts, found), found.row, float(pitch.max()))
-    return found.take(uncrowded(close_pairs(where, TOO_CLOSE * pitch), np.arange(len(pitch))))
+    wide = spots.take(~narrow)
+    both = joined(wide, found)
+    pitch = ground.pitch(both)
+    reach = float(pitch.max(initial=0.0))
+    where = signature(ground.charts.region, positions(ground.charts, both), both.row, reach)
+    kept = uncrowded(close_pairs(where, TOO_CLOSE * pitch), np.arange(len(pitch)))
+    return found.take(kept[len(wide.row) :])
 
 
 def _runs(members: Ints, narrow: Bools, closed: bool) -> list[tuple[Ints, bool]]:
