@@ -197,9 +197,9 @@ def _by_pitch(region: Region, recipe: Recipe, surroundings: Surroundings) -> Ste
     target = float(solve.open_area if solve.count is None else solve.count)  # type: ignore[arg-type]
     recipe = replace(recipe, solve=Solve())
     smallest = _smallest_pitch(recipe)
-    smallest = _smallest_pitch(recipe)
     factor = max(_first_factor(region, recipe, surroundings, solve), smallest)
-    own, packings, found = recipe.packing.seed, 0, []
+    own, packings = recipe.packing.seed, 0
+    found: list[tuple[float, int, Recipe, _Trial]] = []
     for seed in range(own, own + SEEDS):
         begun = replace(recipe, packing=replace(recipe.packing, seed=seed))
         share = (seed - own) / SEEDS
@@ -207,14 +207,18 @@ def _by_pitch(region: Region, recipe: Recipe, surroundings: Surroundings) -> Ste
         trials = yield from within(searching, share, share + 1 / SEEDS)
         packings += len(trials)
         best = _best(trials, target)
-        if best.pattern is None or (best.factor <= smallest and best.value < target - _slack(best, target)):
+        off = abs(best.value - target)
+        if best.pattern is not None and (
+            best.factor > smallest or best.value >= target - _slack(best, target)
+        ):
+            found.append((off, seed, begun, best))
+            factor = best.factor
+        elif not found:
             raise _unreachable(solve, target, best)
-        found.append((abs(best.value - target), seed, begun, best))
-        if abs(best.value - target) <= _slack(best, target):
+        if off <= _slack(best, target):
             break
-        factor = best.factor
     off, seed, begun, best = min(found, key=lambda one: one[:2])
-    assert best.pattern is not None  # or it would have been raised
+    assert best.pattern is not None  # or it would not have been found
     met = off <= _slack(best, target)
     what, reached = f"{target:,.0f} features", f"{best.value:,.0f}"
     if solve.count is None:
