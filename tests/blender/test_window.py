@@ -26,7 +26,8 @@ from scripts import build_extension
 
 ROOT = Path(__file__).resolve().parents[2]
 TOOL = ROOT.parent / "shared" / "tools" / "real-blender"
-SCRIPT = Path(__file__).with_name("in_window.py")
+STORY = ("in_window.py", "parts.py")
+"""What that Blender runs, and what it imports."""
 
 pytestmark = [
     pytest.mark.slow,
@@ -40,18 +41,16 @@ INSTALLING, RUNNING, SHOT = 420, 180, 300
 
 def real_blender(*arguments: str, seconds: float = RUNNING) -> tuple[int | None, str]:
     """Run the tool: its exit code, None where it took too long and was ended; what it and Blender said."""
-    environment = {
-        **os.environ,
-        "REAL_BLENDER_HOME": "/home/bubble_pattern",
-        "REAL_BLENDER_BIND": tempfile.gettempdir(),
-    }
+    environment = {**os.environ, "REAL_BLENDER_HOME": "/home/bubble_pattern"}
     for name in ("BLENDER_USER_RESOURCES", "BLENDER_USER_EXTENSIONS"):
         environment.pop(name, None)
     # to a file and as a group of its own: a pipe would stay open as long as any grandchild lives
     with tempfile.TemporaryFile() as said:
         process = subprocess.Popen(
             [str(TOOL), *arguments],
-            cwd=ROOT,
+            # that Blender sees the folder it is started in, and keeps seeing it as it was when first used: a
+            # clone made anew where another was deleted is not there for it, the temporary folder always is
+            cwd=tempfile.gettempdir(),
             env=environment,
             stdin=subprocess.DEVNULL,
             stdout=said,
@@ -161,6 +160,8 @@ def taking_photos(folder: Path) -> Iterator[None]:
 
 def test_a_designer_s_first_hour(screen: None, tmp_path: Path) -> None:
     picture, answer = tmp_path / "window.png", tmp_path / "found.json"
+    for name in STORY:
+        shutil.copy(Path(__file__).with_name(name), tmp_path)
     with taking_photos(tmp_path):
         _, said = real_blender(
             "shot",
@@ -170,7 +171,7 @@ def test_a_designer_s_first_hour(screen: None, tmp_path: Path) -> None:
             "--",
             "--enable-event-simulate",
             "-P",
-            str(SCRIPT),
+            str(tmp_path / STORY[0]),
             "--",
             str(picture),
             str(answer),
