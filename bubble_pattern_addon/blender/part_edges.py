@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.mesh import Ints
+from ..core.ranking import ranked
+from .attributes import Array
 
 
 @dataclass(frozen=True)
@@ -20,10 +22,10 @@ class Edges:
     highest corner whose edge it is: the faces on both sides
     """
 
-    ends: Ints
-    of_corner: Ints
-    first: Ints
-    last: Ints
+    ends: Array
+    of_corner: Array
+    first: Array
+    last: Array
 
 
 def find_edges(corner_vertex: Ints, start: Ints, total: Ints) -> Edges:
@@ -39,39 +41,20 @@ def find_edges(corner_vertex: Ints, start: Ints, total: Ints) -> Edges:
     key <<= bits
     np.maximum(corner_vertex, following, out=following)
     key |= following
-    key, corner = _ranked(key, 2 * bits)
+    key, corner = ranked(key, 2 * bits)
+    of_corner = np.empty(len(key), dtype=np.int32)
     if _in_pairs(key):
         key, first, last = key[::2], corner[::2], corner[1::2]
-        of_corner = np.empty_like(corner)
-        of_corner[first] = of_corner[last] = np.arange(len(key), dtype=corner.dtype)
+        of_corner[first] = of_corner[last] = np.arange(len(key), dtype=np.int32)
     else:
         new = np.ones(len(key), dtype=bool)
         np.not_equal(key[1:], key[:-1], out=new[1:])
-        of_corner = np.empty_like(corner)
         of_corner[corner] = np.cumsum(new) - 1
         starts = np.flatnonzero(new)
         key, first, last = key[starts], corner[starts], corner[np.roll(starts, -1) - 1]
     ends = np.empty((len(key), 2), dtype=np.int32)
     ends[:, 0], ends[:, 1] = key >> bits, key & ((1 << bits) - 1)
     return Edges(ends, of_corner, first, last)
-
-
-def _ranked(key: Ints, bits: int) -> tuple[Ints, Ints]:
-    """The keys, (L,), of `bits` bits, by rising key, and where each stood, the first of equal ones first; the
-    array itself is used up.
-    """
-    below = len(key).bit_length()
-    if bits + below > 63:
-        order = np.argsort(key, kind="stable")
-        return key[order], order
-    # numbers that carry their places with them are sorted in a third of the time
-    key <<= below
-    key |= np.arange(len(key))
-    key.sort()
-    place = np.empty(len(key), dtype=np.int32 if below < 32 else np.int64)
-    np.bitwise_and(key, (1 << below) - 1, out=place, casting="unsafe")
-    key >>= below
-    return key, place
 
 
 def _in_pairs(key: Ints) -> bool:

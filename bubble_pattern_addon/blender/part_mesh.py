@@ -73,9 +73,9 @@ def lay_geometry(mesh: bpy.types.Mesh, original: Original, origin: Origin) -> Ed
     positions = transformed(origin.positions, origin.base.to_local).astype(np.float32)
     known = np.flatnonzero(origin.vertex >= 0)
     positions[known] = original.position[origin.vertex[known]]
-    triangles = np.concatenate([origin.surface, origin.walls])
-    corner_vertex = np.concatenate([origin.kept_vertices, triangles.ravel()])
-    sizes = np.concatenate([original.loop_total[origin.kept], np.full(len(triangles), 3)])
+    surface, walls = origin.surface, origin.walls
+    corner_vertex = np.concatenate([origin.kept_vertices, surface.ravel(), walls.corner])
+    sizes = np.concatenate([original.loop_total[origin.kept], np.full(len(surface), 3), walls.total])
     starts = np.cumsum(sizes) - sizes
     edges = find_edges(corner_vertex, starts, sizes)
     mesh.vertices.add(len(positions))
@@ -131,7 +131,7 @@ def carry_groups(mesh: bpy.types.Mesh, original: Original, origin: Origin) -> No
 
 def face_values(layer: Layer, origin: Origin) -> Array:
     """Values of a face attribute; on walls they are zero."""
-    walls = np.zeros((len(origin.walls), *layer.values.shape[1:]), dtype=layer.values.dtype)
+    walls = np.zeros((len(origin.walls.total), *layer.values.shape[1:]), dtype=layer.values.dtype)
     on_base = np.concatenate([origin.kept, origin.base.polygon[origin.source]])
     return np.concatenate([layer.values[on_base], walls])
 
@@ -140,7 +140,7 @@ def point_values(layer: Layer, origin: Origin) -> Array:
     """Values of a vertex attribute: the base's own at its vertices, in between at the others."""
     values = np.zeros((len(origin.positions), *layer.values.shape[1:]), dtype=layer.values.dtype)
     surface, walls = cut_values(layer, origin, origin.base.mesh.triangles)
-    values[origin.walls.ravel()] = walls
+    values[origin.walls.corner] = walls
     values[origin.surface.ravel()] = surface
     known = origin.vertex >= 0
     values[known] = layer.values[origin.vertex[known]]
@@ -153,7 +153,7 @@ def cut_values(layer: Layer, origin: Origin, elements: Ints) -> tuple[Array, Arr
     wall_triangle, wall_barycentric = origin.wall_spots
     return (
         blended(layer, surface, origin.barycentric.reshape(-1, 3)),
-        blended(layer, elements[wall_triangle.ravel()], wall_barycentric.reshape(-1, 3)),
+        blended(layer, elements[wall_triangle], wall_barycentric),
     )
 
 
@@ -186,7 +186,7 @@ def lay_materials(
     if len(materials) < 2:
         return
     index = read_named(mesh, MATERIAL, len(mesh.polygons))
-    first_wall = len(index) - len(origin.walls)
+    first_wall = len(index) - len(origin.walls.total)
     if wall_material is not None:
         index[first_wall:] = materials.index(wall_material)
     else:
@@ -198,12 +198,13 @@ def lay_materials(
 
 def lay_sharp_edges(mesh: bpy.types.Mesh, origin: Origin, edges: Edges) -> None:
     """Let rims and the creases of walls be sharp, beside what is sharp in the base."""
-    first_wall = len(edges.of_corner) - origin.walls.size
+    first_wall = len(edges.of_corner) - len(origin.walls.corner)
     sharp = read_named(mesh, SHARP_EDGE, len(edges.ends)).astype(np.bool_)
     sharp |= (edges.first < first_wall) & (edges.last >= first_wall)
     within = np.flatnonzero((edges.first >= first_wall) & (edges.first != edges.last))
-    one, other = ((side[within] - first_wall) // 3 for side in (edges.first, edges.last))
-    sharp[within] |= creased(mesh, len(origin.walls), one, other)
+    owner = np.repeat(np.arange(len(origin.walls.total)), origin.walls.total)
+    one, other = (owner[side[within] - first_wall] for side in (edges.first, edges.last))
+    sharp[within] |= creased(mesh, len(origin.walls.total), one, other)
     write_values(mesh, SHARP_EDGE, 'EDGE', 'BOOLEAN', sharp)
 
 

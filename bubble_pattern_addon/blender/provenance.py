@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 
+from ..core.facets import Faces, joined_faces
 from ..core.mesh import Bools, Floats, Ints
 from ..core.metric import Places
 from .attributes import (
@@ -84,12 +85,12 @@ def read_original(obj: bpy.types.Object, mesh: bpy.types.Mesh) -> Original:
 @dataclass(frozen=True)
 class Origin:
     """Where the faces of a part come from, in the winding of the object's coordinates: whole faces of the
-    base, then what is left of cut ones, then walls.
+    base, then what is left of cut ones, in triangles, then walls, a face for each of their facets.
 
     kept: (K,) faces of the base that are whole; kept_loops, kept_vertices: the base's loops and the part's
         vertices at their corners, one face after the other
     surface: (S, 3) triangles on the base; source: (S,) triangle of the base each lies on
-    walls: (W, 3) triangles of walls; feature: (W,) whose wall it is
+    walls: W faces of walls; feature: (W,) whose wall it is
     vertex: (N,) base vertex that is at the same place, or -1
     positions: (N, 3) vertices of the part in the base's frame; places: those of its features
     """
@@ -99,7 +100,7 @@ class Origin:
     kept_vertices: Ints
     surface: Ints
     source: Ints
-    walls: Ints
+    walls: Faces
     feature: Ints
     vertex: Ints
     positions: Floats
@@ -108,7 +109,7 @@ class Origin:
 
     @property
     def wall_triangle(self) -> Ints:
-        """(W,) triangle of the base that the feature of each wall triangle stands on."""
+        """(W,) triangle of the base that the feature of each face of a wall stands on."""
         return self.places.triangle[self.feature]
 
     @cached_property
@@ -119,17 +120,18 @@ class Origin:
 
     @cached_property
     def wall_spots(self) -> tuple[Ints, Array]:
-        """Triangle (W, 3) and barycentric coordinates (W, 3, 3) that corners of walls take their values from.
+        """Triangle (C,) and barycentric coordinates (C, 3) that the corners of walls take their values from.
 
         Those of a cut face at the same vertex of the rim, or else the place of the feature.
         """
         carrier = np.full(len(self.positions), -1)
         carrier[self.surface] = np.arange(self.surface.size).reshape(-1, 3)
-        found = carrier[self.walls]
+        found = carrier[self.walls.corner]
         rim = found >= 0
-        triangle = np.where(rim, self.source[found // 3], self.wall_triangle[:, None])
-        own = self.places.barycentric[self.feature].astype(np.float32)
-        barycentric = np.where(rim[:, :, None], self.barycentric.reshape(-1, 3)[found], own[:, None])
+        feature = np.repeat(self.feature, self.walls.total)
+        triangle = np.where(rim, self.source[found // 3], self.places.triangle[feature])
+        own = self.places.barycentric[feature].astype(np.float32)
+        barycentric = np.where(rim[:, None], self.barycentric.reshape(-1, 3)[found], own)
         return triangle, barycentric
 
 
@@ -142,7 +144,8 @@ def trace(part: Part, places: Places, base: Base, original: Original) -> Origin:
     is_whole[base.polygon[~whole]] = False
     kept = np.flatnonzero(is_whole)
     loops = ranges(original.loop_start[kept], original.loop_total[kept])
-    walls = np.flatnonzero(part.source < 0)
+    rows = np.flatnonzero(part.source < 0)
+    walls = joined_faces(faces[rows], part.facet[rows])
     surface = np.flatnonzero((part.source >= 0) & ~is_whole[base.polygon[np.maximum(part.source, 0)]])
     return Origin(
         kept,
@@ -150,8 +153,8 @@ def trace(part: Part, places: Places, base: Base, original: Original) -> Origin:
         loop_vertex[loops],
         faces[surface],
         part.source[surface],
-        faces[walls],
-        -1 - part.source[walls],
+        walls,
+        -1 - part.source[rows[walls.triangle]],
         part.vertex,
         part.mesh.vertices,
         places,

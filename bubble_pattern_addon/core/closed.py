@@ -9,6 +9,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from .mesh import Bools, Floats, Ints, Mesh
+from .ranking import ranked
 
 BLOCK = 1 << 14
 """Triangles worked on together: their values stay in the processor's own memory."""
@@ -79,11 +80,11 @@ def opposites(triangles: Ints) -> Ints | None:
     """For each directed edge of a closed surface the one that runs back along it, (3 T,); None where it is
     not closed. Edges are numbered as in `edge_keys`: edge k of triangle t is k T + t.
     """
-    keys = edge_keys(triangles)[0]
-    order = np.argsort(keys)
-    if not _pair_up(keys[order]):
+    keys, bits = edge_keys(triangles)
+    keys, order = ranked(keys, 2 * bits + 1)
+    if not _pair_up(keys):
         return None
-    opposite = np.empty_like(order)
+    opposite = np.empty(len(order), dtype=np.int64)
     opposite[order[::2]], opposite[order[1::2]] = order[1::2], order[::2]
     return opposite
 

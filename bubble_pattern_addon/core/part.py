@@ -14,6 +14,7 @@ class Part:
 
     mesh: the part; source: (T',) triangle of the base each of its triangles lies on, -1 - feature id on a
         feature's wall
+    facet: (T',) flat facet of a feature each of its triangles lies on, numbered through all; -1 on the base
     vertex: (V',) vertex of the base at exactly this place, -1 for a vertex the cut made
     untouched: (T',) triangles that are triangles of the base as they were: their corners are the corners of
         their source, in the same order
@@ -26,6 +27,7 @@ class Part:
 
     mesh: Mesh
     source: Ints
+    facet: Ints
     vertex: Ints
     untouched: Bools
     thickness: Floats

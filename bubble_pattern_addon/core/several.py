@@ -51,6 +51,8 @@ def onto(first: Part, second: Part) -> Part:
     below = second.source >= 0
     at = np.where(below, second.source, 0)
     source = np.where(below, first.source[at], second.source - count)
+    facets = int(first.facet.max(initial=-1)) + 1
+    facet = np.where(below, first.facet[at], second.facet + facets)
     known = second.vertex >= 0
     vertex = np.where(known, first.vertex[np.where(known, second.vertex, 0)], -1)
     check = replace(
@@ -67,6 +69,7 @@ def onto(first: Part, second: Part) -> Part:
     return replace(
         second,
         source=source,
+        facet=facet,
         vertex=vertex,
         untouched=second.untouched & first.untouched[at] & below,
         thickness=np.concatenate([first.thickness, second.thickness]),

@@ -32,6 +32,7 @@ def judge(plan: Plan, left: Cut) -> Part:
         mesh = Mesh(left.mesh.vertices, carry.turned(left.mesh.triangles, turn))
         owner = plan.cutters.feature[left.facet]
         source = np.concatenate([sound.triangle[left.face], -1 - owner])
+        facet = np.concatenate([np.full(len(left.face), -1), left.facet])
         vertex = np.where(named >= 0, sound.vertex[named], -1)
         untouched = np.concatenate([whole, np.zeros(len(owner), dtype=bool)])
         shape = _wall_shapes(left, owner, len(plan.pattern))
@@ -55,7 +56,7 @@ def judge(plan: Plan, left: Cut) -> Part:
         plan.feature.kind,
     )
     thickness, kind = plan.wall.thickness, plan.feature.kind
-    return Part(mesh, source, vertex, untouched, thickness, pierced, failures, check, undercut, kind)
+    return Part(mesh, source, facet, vertex, untouched, thickness, pierced, failures, check, undercut, kind)
 
 
 def _undercut_note(plan: Plan, undercut: Bools) -> str:

@@ -17,6 +17,7 @@ from scipy.integrate import trapezoid
 
 from bubble_pattern_addon.core.closed import measure
 from bubble_pattern_addon.core.errors import RecipeError
+from bubble_pattern_addon.core.facets import joined_faces
 from bubble_pattern_addon.core.feature import make_cutters
 from bubble_pattern_addon.core.feature_recipe import PROFILES, Feature
 from bubble_pattern_addon.core.feature_sizes import feature_sizes
@@ -141,6 +142,25 @@ def test_every_kind_with_every_profile_on_every_base(kind, profile, base_name):
     deep = round(float(np.mean(part.thickness)), 3) if feature.through else feature.depth
     expected = len(pattern) * volume_of(feature, 1.8, deep) * (-1 if feature.adds else 1)
     assert part.check.removed_volume == pytest.approx(expected, rel=0.02 if base_name == "flat" else 0.12)
+    assert_flat_faces(part)
+
+
+def assert_flat_faces(part: Part) -> None:
+    """The facets of walls are flat, so that each can be one face, and as good as all of them are."""
+    walls = np.flatnonzero(part.source < 0)
+    assert np.array_equal(walls, np.flatnonzero(part.facet >= 0))
+    mesh = Mesh(part.mesh.vertices, part.mesh.triangles[walls])
+    faces = joined_faces(mesh.triangles, part.facet[walls])
+    start = np.cumsum(faces.total) - faces.total
+    following = np.arange(1, len(faces.corner) + 1)
+    following[start + faces.total - 1] = start
+    at = mesh.vertices[faces.corner]
+    area = np.add.reduceat(np.cross(at, at[following]) / 2, start)
+    # the area inside an outline seen from its front is that of its triangles only where all lie in one plane
+    whole = np.linalg.norm(mesh.area_vectors, axis=1).sum() / 2
+    assert np.linalg.norm(area, axis=1).sum() == pytest.approx(whole, rel=1e-7)
+    # some are in two pieces, where a slanting wall comes out of a rounded surface twice
+    assert len(faces.total) < 1.02 * len(np.unique(part.facet[walls])) + 3
 
 
 @pytest.mark.parametrize("kind", KINDS)

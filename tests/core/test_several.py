@@ -37,6 +37,9 @@ def test_layers_add_up_and_every_face_knows_where_it_is_from(layers):
         wall = part.mesh.corners[part.source == -1 - which].reshape(-1, 3)
         assert np.linalg.norm((wall - at)[:, :2], axis=1).max() == pytest.approx(0.9)
     assert part.kind == "feature"
+    assert np.array_equal(part.facet >= 0, part.source < 0)
+    owners = np.unique(np.stack([part.facet, part.source])[:, part.source < 0], axis=1)
+    assert len(np.unique(owners[0])) == owners.shape[1]  # no facet is shared by two features
 
 
 def test_one_layer_is_the_part_itself():
