@@ -31,6 +31,7 @@ class Combined(Described):
         parts = [part.bind(surroundings) for part in self.of]
 
         def combined(places: Places) -> Floats:
+            """The values (n,) of all fields at n places, folded."""
             result = parts[0](places)
             for part in parts[1:]:
                 result = fold(result, part(places))
@@ -98,6 +99,7 @@ class Blend(Described):
         first, second, mask = (part.bind(surroundings) for part in (self.first, self.second, self.mask))
 
         def blend(places: Places) -> Floats:
+            """Values (n,) at n places, the second field's by the share that the mask says."""
             share = np.clip(mask(places), 0.0, 1.0)
             return (1 - share) * first(places) + share * second(places)
 
@@ -167,6 +169,7 @@ class SubRegions(Described):
         fields.append(self.otherwise.bind(surroundings))
 
         def choose(places: Places) -> Floats:
+            """Values (n,) at n places, each of the field of its sub-region."""
             number = part_of[places.triangle]
             result = np.empty(len(places))
             for at, field in enumerate(fields):

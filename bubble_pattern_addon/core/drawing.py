@@ -366,6 +366,7 @@ def _runs(start: Floats, end: Floats, is_cut: Bools) -> list[tuple[bool, Line]]:
 
 def _scaled(drawing: Drawing, factor: float) -> Drawing:
     def larger(lines: tuple[Line, ...]) -> tuple[Line, ...]:
+        """The lines, `factor` times as large."""
         return tuple(Line(line.points * factor, line.closed) for line in lines)
 
     return replace(

@@ -213,6 +213,7 @@ def _blocks(handles: Iterator[int]) -> Iterator[Pair]:
 
 def _objects() -> Iterator[Pair]:
     def dictionary(kind: str, handle: int, owner: int, *entries: tuple[str, int]) -> Iterator[Pair]:
+        """A dictionary object with its entries, each a name and a handle."""
         yield from [(0, kind), (5, _hex(handle)), (330, _hex(owner)), (100, "AcDbDictionary"), (281, 1)]
         for name, entry in entries:
             yield from [(3, name), (350, _hex(entry))]

@@ -57,6 +57,7 @@ class Graded(Described):
         share, shape = self.share(surroundings), self.shape()
 
         def graded(places: Places) -> Floats:
+            """Values (n,) at n places, between from_ and to."""
             return self.from_ + (self.to - self.from_) * shape(share(places))
 
         return graded
@@ -66,6 +67,7 @@ class Graded(Described):
         falloff = _through(self.curve) if self.falloff == "curve" else SHAPES[self.falloff]
 
         def shape(t: Floats) -> Floats:
+            """What becomes of shares (n,)."""
             t = np.clip(t, 0.0, 1.0) if self.clamp else t
             return falloff(1 - t if self.invert else t)
 

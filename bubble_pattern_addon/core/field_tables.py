@@ -174,6 +174,7 @@ def wanted(*described: Described) -> Wanted:
     parts = [part for field in described for part in _parts(field)]
 
     def names(cls: type[Any], key: str) -> frozenset[str]:
+        """What the parts of this class have under `key`."""
         found = [getattr(part, key) for part in parts if isinstance(part, cls)]
         return frozenset(name for name in found if name is not None)
 
