@@ -86,7 +86,7 @@ def local_solids(
     for at, tip, side in ((first, stack.low_tip, -1), (last - 1, stack.high_tip, 1)):
         if tip:
             continue
-        lid = _lids(flat[:, at], outline.convex) + (at - first) * k
+        lid = lids(flat[:, at], outline.convex) + (at - first) * k
         parts.append(lid if side > 0 else lid[..., ::-1])
         faces.append(np.full(lid.shape[-2], facets))
         cap.append(np.array([side]))
@@ -129,7 +129,7 @@ def _walls(levels: int, k: int, stack: Sections, bent: bool) -> tuple[Ints, Ints
     return np.concatenate(parts), np.concatenate(facets), number
 
 
-def _lids(outline: Floats, convex: bool) -> Ints:
+def lids(outline: Floats, convex: bool) -> Ints:
     """Triangles over outlines (m, k, 2), wound like them: (k - 2, 3), or (m, k - 2, 3) where one way does not
     do for all of them.
     """

@@ -23,3 +23,13 @@ def ranked(key: Ints, bits: int) -> tuple[Ints, np.ndarray]:
     np.bitwise_and(key, (1 << below) - 1, out=place, casting="unsafe")
     key >>= below
     return key, place
+
+
+def numbered(key: Ints, bits: int) -> tuple[Ints, Ints]:
+    """The different keys, rising, and the row of each key among them, (n,); for the rest see `ranked`."""
+    key, place = ranked(key, bits)
+    new = np.ones(len(key), dtype=bool)
+    np.not_equal(key[1:], key[:-1], out=new[1:])
+    row = np.empty(len(key), dtype=np.int64)
+    row[place] = np.cumsum(new) - 1
+    return key[new], row

@@ -8,7 +8,9 @@ import manifold3d
 import numpy as np
 
 from . import carry
+from .columns import columns_of, straight
 from .cutters import Cutters
+from .drilling import drilled
 from .elsewhere import elsewhere
 from .errors import BaseError
 from .feature_recipe import Feature
@@ -64,14 +66,41 @@ def cutting_seconds(plan: Plan) -> float:
 
 
 def cut(plan: Plan) -> Cut:
-    """The boolean of `plan` on its base, split where many holes crowd one face: see `combine`."""
+    """What `plan` leaves of its base: straight holes are drilled, see core.drilling, what cannot be is left to
+    one boolean, see `combine`; and so is everything where many holes crowd one face, which is split for it.
+    """
     wall, base = plan.wall, plan.sound.mesh
     through = np.flatnonzero(plan.meets & np.isfinite(wall.seen_axis))
     feature = wall.seen_feature[through]
     pattern = plan.pattern
     place = pattern.position[feature] + wall.seen_axis[through, None] * pattern.normal[feature]
     split, piece = split_crowded(base, wall.seen_triangle[through], place, _room(plan)[feature])
-    return combine(split, piece, plan.cutters, plan.feature.adds)
+    if split is not base or not straight(plan.feature) or not len(plan.cutters.facet):
+        return combine(split, piece, plan.cutters, plan.feature.adds)
+    return _drilled(plan)
+
+
+def _drilled(plan: Plan) -> Cut:
+    columns = columns_of(plan.pattern, plan.feature, plan.sizes, plan.cutters, plan.extent)
+    wall, seen = plan.wall, np.flatnonzero(plan.meets)
+    row = np.full(len(plan.pattern), -1)
+    row[columns.feature] = np.arange(len(columns))
+    owner = row[wall.seen_feature[seen]]
+    heights = wall.seen_low[seen], wall.seen_high[seen]
+    left, done = drilled(plan.sound.mesh, columns, owner, wall.seen_triangle[seen], *heights)
+    if len(done) == len(columns):
+        return left
+    # faces of the base and walls of the drilled holes are told apart by their numbers
+    count = len(plan.sound.mesh.triangles)
+    rest = plan.cutters.without(columns.feature[done])
+    last = combine(left.mesh, np.concatenate([left.face, count + left.facet]), rest)
+    walls = last.face >= count
+    order = np.concatenate([np.flatnonzero(~walls), np.flatnonzero(walls), np.arange(len(walls), len(last.mesh.triangles))])
+    return Cut(
+        Mesh(last.mesh.vertices, last.mesh.triangles[order]),
+        last.face[~walls],
+        np.concatenate([last.face[walls] - count, last.facet]),
+    )
 
 
 def _room(plan: Plan) -> Floats:

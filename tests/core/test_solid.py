@@ -65,6 +65,8 @@ def assert_sources(part: Part, base: Mesh) -> None:
     """
     size = np.ptp(base.vertices, axis=0).max()
     from_base = part.source >= 0
+    # a face without area has no plane: it stays as it is, or is gone
+    from_base[from_base] = np.linalg.norm(base.area_vectors[part.source[from_base]], axis=1) > 0
     face, corners = base.corners[part.source[from_base]], part.mesh.corners[from_base]
     normal = base.area_vectors[part.source[from_base]]
     normal /= np.linalg.norm(normal, axis=1)[:, None]
@@ -373,7 +375,8 @@ def folded(depth: float) -> Mesh:
 
 
 @pytest.mark.parametrize("depth", [1e-9, 1e-7, 1e-5])
-def test_a_folded_sliver_dissolves_without_harm_and_is_told(depth):
+def test_a_folded_sliver_dissolves_in_the_boolean_without_harm_and_is_told(monkeypatch, depth):
+    monkeypatch.setattr(solid, "straight", lambda feature: False)
     base = folded(depth)
     sliver = len(base.triangles) - 3
     part = make(base, laid([[12, 2, 0]], UP, 3, 1.8))
@@ -382,10 +385,20 @@ def test_a_folded_sliver_dissolves_without_harm_and_is_told(depth):
     assert part.check.notes[0].startswith("1 face of the base narrower than")
 
 
+@pytest.mark.parametrize("depth", [1e-9, 1e-7, 1e-5])
+def test_drilling_leaves_a_folded_sliver_as_it_is(depth):
+    base = folded(depth)
+    part = make(base, laid([[12, 2, 0]], UP, 3, 1.8))
+    assert_good(part, base, 1)
+    assert part.untouched[part.source == len(base.triangles) - 3].tolist() == [True]
+    assert part.check.notes == ()
+
+
 @pytest.mark.parametrize("harm", ["swap", "move", "dent"])
 def test_a_change_where_no_hole_is_is_a_problem(monkeypatch, harm):
     base = slab(12)
     whole = solid.combine
+    monkeypatch.setattr(solid, "straight", lambda feature: False)
 
     def harmed(*given):
         left = whole(*given)
@@ -534,6 +547,7 @@ def test_any_plate_however_it_lies(width, depth, thickness, share, pitch, sides,
 def test_a_base_that_is_cut_away_altogether_leaves_nothing(monkeypatch):
     base, pattern = plate(), laid([[0, 0, 0]], UP, 3, 1.8)
     whole = solid.combine
+    monkeypatch.setattr(solid, "straight", lambda feature: False)
 
     def all_of_it(mesh, face, cutters, adds):
         lid = box((-99, -99, -99), (99, 99, 99))

@@ -1,0 +1,288 @@
+"""What is left of the base's faces round columns, as triangles.
+
+What is left of a face is bounded by pieces of its sides, out of the columns, and by the ways of the outlines
+over it, against their direction. Each begins where another ends, so they link up to polygons; an outline that
+lies in one face all round is a hole in that face's polygon. manifold3d triangulates all polygons at once, laid
+out side by side.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import manifold3d
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from .columns import Columns
+from .mesh import Bools, Floats, Ints, Mesh
+from .ranking import numbered, ranked
+from .tracing import Traces
+
+APART = 4.0
+"""Times a polygon's size that polygons are laid apart."""
+TOGETHER = 24
+"""Faces with holes that are triangulated together: the time grows with the square of their number."""
+COVERED = 1e-9
+"""Share of a face by which its triangles may differ from what is left of it."""
+
+
+@dataclass(frozen=True)
+class Points:
+    """Names of the part's vertices: those of the base come first, then the corners of the outlines above,
+    then those below, then the crossings.
+
+    place: (N, 3); corners: number of the first corner above; lower: of the first corner below; crossings: of
+    the first crossing
+    """
+
+    place: Floats
+    corners: int
+    lower: int
+    crossings: int
+
+
+@dataclass(frozen=True)
+class _Runs:
+    """Directed pieces of boundaries, h of them: from a vertex to another on a face, with the corners between.
+
+    face, start, end: (h,); corner: (h,) name of the first corner after the start, one of `count`, (h,), that
+    run up or down by `step` (h,) round an outline, whose names are `ring` and the `size` - 1 that follow
+    """
+
+    face: Ints
+    start: Ints
+    end: Ints
+    corner: Ints
+    count: Ints
+    step: Ints
+    ring: Ints
+    size: Ints
+
+
+@dataclass(frozen=True)
+class _Polygons:
+    """Polygons: `vertex` (P,) one after the other, `total` (p,) of each, on the faces `face` (p,), with their
+    interior to the left.
+    """
+
+    vertex: Ints
+    total: Ints
+    face: Ints
+
+
+def remainder(base: Mesh, columns: Columns, traces: Traces, points: Points) -> tuple[Ints, Ints] | None:
+    """What is left of the base: triangles of `points`, (F, 3), and the face of the base each lies on, (F,).
+
+    None where columns are so close together that their outlines touch.
+    """
+    touched = np.zeros(len(base.triangles), dtype=bool)
+    touched[traces.into] = True
+    touched[traces.begin[traces.begin >= 0]] = True
+    touched |= traces.inside[base.triangles].any(axis=1)
+    sides = _sides(base, traces, points, np.flatnonzero(touched))
+    if sides is None:
+        return None
+    polygons = _linked(_joined(sides, _arcs(columns, traces, points)), len(points.place))
+    if polygons is None:
+        return None
+    holes = _holes(columns, traces, points)
+    pieces = _triangulated(base, points, polygons, holes)
+    if pieces is None:
+        return None
+    whole = np.flatnonzero(~touched)
+    return np.concatenate([base.triangles[whole], pieces[0]]), np.concatenate([whole, pieces[1]])
+
+
+def _sides(base: Mesh, traces: Traces, points: Points, faces: Ints) -> _Runs | None:
+    """The pieces of the sides of `faces`, (t,), that are out of the columns; None where columns overlap."""
+    start, end = base.triangles[faces].ravel(), np.roll(base.triangles[faces], -1, axis=1).ravel()
+    owner = np.repeat(faces, 3)
+    count = len(base.vertices)
+    bits = (count * count).bit_length()
+    keys, edge = numbered(traces.low * count + traces.high, bits)
+    pieces, first = _outside(traces, points, edge, len(keys))
+    if pieces is None:
+        return None
+    wanted = np.minimum(start, end) * count + np.maximum(start, end)
+    row = np.minimum(np.searchsorted(keys, wanted), max(len(keys) - 1, 0))
+    cut = keys[row] == wanted if len(keys) else np.zeros(len(wanted), dtype=bool)
+    whole = np.flatnonzero(~cut & ~traces.inside[start])
+    number = np.where(cut, np.diff(first)[row], 0) if len(keys) else np.zeros(len(wanted), dtype=np.int64)
+    side = np.repeat(np.arange(len(wanted)), number)
+    piece = pieces[_ranges(first[row[cut]], number[cut])]
+    turned = start[side] > end[side]
+    piece[turned] = piece[turned][:, ::-1]
+    none = np.zeros(len(whole) + len(side), dtype=np.int64)
+    return _Runs(
+        np.concatenate([owner[whole], owner[side]]),
+        np.concatenate([start[whole], piece[:, 0]]),
+        np.concatenate([end[whole], piece[:, 1]]),
+        *(none,) * 5,
+    )
+
+
+def _outside(traces: Traces, points: Points, edge: Ints, count: int) -> tuple[Ints, Ints] | tuple[None, None]:
+    """Pieces of `count` crossed edges that are out of the columns, from low to high, (n, 2), and where those
+    of each edge begin, (count + 1,). edge: (X,) which one each crossing is on
+    """
+    crossing = np.lexsort((traces.share, edge))
+    edge, leaves = edge[crossing], traces.leaves[crossing]
+    first, last = (np.searchsorted(edge, np.arange(count), side) for side in ("left", "right"))
+    # an edge that does not begin in a column does as if it came out of one, and likewise at its end
+    from_low = np.flatnonzero(~leaves[first])
+    to_high = np.flatnonzero(leaves[last - 1])
+    name = np.concatenate([
+        traces.low[crossing[first[from_low]]],
+        points.crossings + crossing,
+        traces.high[crossing[first[to_high]]],
+    ])
+    out = np.concatenate([np.ones(len(from_low), dtype=bool), leaves, np.zeros(len(to_high), dtype=bool)])
+    owner = np.concatenate([from_low, edge, to_high])
+    order = np.argsort(owner, kind="stable")
+    name, out, owner = name[order], out[order], owner[order]
+    if len(out) % 2 or not out[0::2].all() or out[1::2].any() or (owner[0::2] != owner[1::2]).any():
+        return None, None
+    return name.reshape(-1, 2), np.searchsorted(owner[0::2], np.arange(count + 1))
+
+
+def _ranges(start: Ints, number: Ints) -> Ints:
+    """`number`, (n,), whole numbers from each `start`, (n,), on, end to end."""
+    before = np.cumsum(number) - number
+    return np.arange(number.sum()) + np.repeat(start - before, number)
+
+
+def _arcs(columns: Columns, traces: Traces, points: Points) -> _Runs:
+    """The ways of the outlines from crossing to crossing, so directed that the face is on their left."""
+    column, below = np.divmod(traces.way, 2)
+    here, there = np.floor(traces.at).astype(np.int64), traces.following
+    size = columns.count[column]
+    wraps = traces.first[there]
+    count = here[there] - here + np.where(wraps, size, 0)
+    ring = np.where(below, points.lower, points.corners) + columns.start[column]
+    offset = here - columns.start[column]
+    # seen from above an outline goes round with the column on its left: over the far side, which is seen from
+    # behind, as it is, over the near side the other way round
+    start = points.crossings + np.where(below, np.arange(len(there)), there)
+    end = points.crossings + np.where(below, there, np.arange(len(there)))
+    corner = ring + np.where(below, offset + 1, offset + count) % size
+    return _Runs(traces.into, start, end, corner, count, np.where(below, 1, -1), ring, size)
+
+
+def _joined(one: _Runs, other: _Runs) -> _Runs:
+    return _Runs(*(np.concatenate([getattr(runs, name) for runs in (one, other)]) for name in _Runs.__annotations__))
+
+
+def _linked(runs: _Runs, names: int) -> _Polygons | None:
+    """The runs linked up to polygons; None where they do not."""
+    number = len(runs.face)
+    bits = (int(runs.face.max(initial=0)) * names + names).bit_length()
+    start, from_start = ranked(runs.face * names + runs.start, bits)
+    end, from_end = ranked(runs.face * names + runs.end, bits)
+    if (start != end).any() or (start[1:] == start[:-1]).any():
+        return None
+    following = np.empty(number, dtype=np.int64)
+    following[from_end] = from_start
+    graph = coo_array((np.ones(number, dtype=np.int8), (np.arange(number), following)), shape=(number, number))
+    parts, label = connected_components(graph, directed=False)
+    total = np.bincount(label, minlength=parts)
+    first = np.empty(parts, dtype=np.int64)
+    first[label[::-1]] = np.arange(number)[::-1]
+    order = _round(following, first, total)
+    # a run is its start and then its corners
+    count = runs.count[order] + 1
+    run = np.repeat(order, count)
+    place = _ranges(np.zeros(len(order), dtype=np.int64), count)
+    around = runs.corner[run] - runs.ring[run] + runs.step[run] * (place - 1)
+    vertex = np.where(place == 0, runs.start[run], runs.ring[run] + around % np.maximum(runs.size[run], 1))
+    corners = np.add.reduceat(count, np.cumsum(total) - total) if number else total
+    return _Polygons(vertex, corners, runs.face[first])
+
+
+def _round(following: Ints, first: Ints, total: Ints) -> Ints:
+    """The `total`, (n,), runs that follow each other from each `first`, (n,), end to end."""
+    start = np.cumsum(total) - total
+    order = np.empty(total.sum(), dtype=np.int64)
+    under_way, run, step = np.arange(len(first)), first, 0
+    while len(under_way):
+        order[start[under_way] + step] = run
+        step += 1
+        more = total[under_way] > step
+        under_way, run = under_way[more], following[run[more]]
+    return order
+
+
+def _holes(columns: Columns, traces: Traces, points: Points) -> _Polygons:
+    """The outlines that lie in one face all round."""
+    free = traces.begin >= 0
+    free[traces.way] = False
+    way = np.flatnonzero(free)
+    column, below = np.divmod(way, 2)
+    size = columns.count[column]
+    ring = np.where(below, points.lower, points.corners) + columns.start[column]
+    forward = np.repeat(below == 1, size)
+    place = _ranges(np.zeros(len(way), dtype=np.int64), size)
+    place = np.where(forward, place, np.repeat(size, size) - 1 - place)
+    return _Polygons(np.repeat(ring, size) + place, size, traces.begin[way])
+
+
+def _triangulated(base: Mesh, points: Points, outer: _Polygons, holes: _Polygons) -> tuple[Ints, Ints] | None:
+    """Triangles of the polygons with the holes cut out of them, (n, 3), and the faces they lie on, (n,); None
+    where they do not cover what is left of the faces.
+    """
+    pierced = np.zeros(len(base.triangles), dtype=bool)
+    pierced[holes.face] = True
+    pierced = pierced[outer.face]
+    all_of = _Polygons(*(np.concatenate([getattr(some, name) for some in (outer, holes)]) for name in _Polygons.__annotations__))
+    flat, cell = _flattened(base, points, all_of)
+    wide = int(np.ceil(np.sqrt(cell.max(initial=0) + 1)))
+    laid = flat + APART * np.repeat(np.stack([cell % wide, cell // wide], axis=1), all_of.total, axis=0)
+    owner = np.repeat(np.arange(len(all_of.total)), all_of.total)
+    bounds = np.concatenate([[0], np.cumsum(all_of.total)])
+    plain = np.flatnonzero(~pierced)
+    batches = [plain] if len(plain) else []
+    rest = np.concatenate([np.flatnonzero(pierced), np.arange(len(outer.total), len(all_of.total))])
+    rest = rest[np.argsort(cell[rest], kind="stable")]
+    changes = np.flatnonzero(np.diff(cell[rest], prepend=-1))
+    batches += np.split(rest, changes[TOGETHER::TOGETHER]) if len(rest) else []
+    found = []
+    for batch in batches:
+        contours = [laid[bounds[which] : bounds[which + 1]] for which in batch]
+        triangles = np.asarray(manifold3d.triangulate(contours), dtype=np.int64).reshape(-1, 3)
+        found.append(_ranges(bounds[batch], all_of.total[batch])[triangles])
+    corner = np.concatenate([*found, np.zeros((0, 3), dtype=np.int64)])
+    if not _covering(flat, corner, owner, cell, bounds):
+        return None
+    return all_of.vertex[corner], all_of.face[owner[corner[:, 0]]]
+
+
+def _flattened(base: Mesh, points: Points, polygons: _Polygons) -> tuple[Floats, Ints]:
+    """The polygons' vertices in the planes of their faces, (P, 2), in units of these; and the number of the
+    face of each polygon among those that have any, (p,).
+    """
+    faces, cell = numbered(polygons.face.copy(), int(polygons.face.max(initial=0)).bit_length())
+    origin, second, third = base.corners[faces].swapaxes(0, 1)
+    along, across = second - origin, third - origin
+    size = np.sqrt(np.maximum((along**2).sum(axis=1), (across**2).sum(axis=1)))[:, None]
+    x = along / np.linalg.norm(along, axis=1)[:, None]
+    normal = np.cross(along, across)
+    y = np.cross(normal / np.linalg.norm(normal, axis=1)[:, None], x)
+    which = np.repeat(cell, polygons.total)
+    offset = points.place[polygons.vertex] - origin[which]
+    flat = [(offset * (way / size)[which]).sum(axis=1) for way in (x, y)]
+    return np.stack(flat, axis=1), cell
+
+
+def _covering(flat: Floats, corner: Ints, owner: Ints, cell: Ints, bounds: Ints) -> bool:
+    """Do the triangles `corner`, (n, 3), lie the right way up and cover what the polygons enclose?"""
+    if not len(cell):
+        return True
+    x, y = flat.T
+    following = np.arange(1, len(x) + 1)
+    following[bounds[1:] - 1] = bounds[:-1]
+    enclosed = np.add.reduceat(x * y[following] - x[following] * y, bounds[:-1])
+    a, b, c = corner.T
+    area = (x[b] - x[a]) * (y[c] - y[a]) - (y[b] - y[a]) * (x[c] - x[a])
+    apart = np.bincount(cell[owner[a]], area, cell.max() + 1) - np.bincount(cell, enclosed)
+    return bool((area > -COVERED).all() and (np.abs(apart) <= COVERED).all())
