@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .columns import Columns
-from .mesh import Bools, Floats, Ints
+from .mesh import Bools, Ints
 from .remainders import Points
 from .tracing import Traces
 
@@ -13,21 +13,18 @@ from .tracing import Traces
 def walls(columns: Columns, traces: Traces, points: Points) -> tuple[Ints, Ints]:
     """Triangles of `points`, (W, 3), that face the axes of the `good` columns, and their facets, (W,)."""
     row = np.flatnonzero(traces.good[columns.owner])
-    owner = columns.owner[row]
-    facet = columns.wall[owner] + row - columns.start[owner]
+    facet = columns.side_facet
     side = np.floor(traces.at).astype(np.int64)
     bent = np.zeros(len(columns.outline), dtype=bool)
     bent[side] = True
     straight = ~bent[row]
     plain = _straight(row[straight], columns.following, points)
     triangles, of = _bent(row[~straight], columns.following, traces, side, points)
-    number = np.empty(len(columns.outline), dtype=np.int64)
-    number[row] = facet
-    faces, facets = [plain, triangles], [np.repeat(facet[straight], 2), number[of]]
+    faces, facets = [plain, triangles], [np.repeat(facet[row[straight]], 2), facet[of]]
     if not columns.through:
         closed = np.flatnonzero(traces.good[columns.lid_owner])
         faces.append(points.lower + columns.lid[closed])
-        facets.append(columns.floor[columns.lid_owner[closed]])
+        facets.append(columns.floor_facet[columns.lid_owner[closed]])
     return np.concatenate(faces), np.concatenate(facets)
 
 
@@ -50,9 +47,7 @@ def _bent(row: Ints, following: Ints, traces: Traces, side: Ints, points: Points
     share = np.concatenate([none - 2, none - 1, traces.at - side, none + 2, none + 3])
     beginning, ending = points.corners + row, points.corners + following[row]
     below = points.lower - points.corners
-    name = np.concatenate(
-        [beginning, beginning + below, points.crossings + crossing, ending, ending + below]
-    )
+    name = np.concatenate([beginning, beginning + below, points.crossings + crossing, ending, ending + below])
     yes, no = np.ones(len(row), dtype=bool), np.zeros(len(row), dtype=bool)
     above = np.concatenate([yes, no, traces.way % 2 == 0, yes, no])
     order = np.lexsort((share, of))

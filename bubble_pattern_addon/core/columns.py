@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .cutters import Cutters
 from .feature_recipe import Feature
 from .feature_sizes import FeatureSizes, sides
 from .loft import frames, lids
@@ -24,8 +23,6 @@ class Columns:
     top, bottom: (m,) how far each reaches above its centre and below
     start: (m + 1,) where the corners of each begin; outline: (K, 2) places of the corners in the frame,
         counter-clockwise seen from above
-    wall, floor: (m,) number of the facet between the first corner and the second, those of the other sides
-        follow; and of the facet at the bottom
     lid: (L, 3) corners of the triangles that cover the outlines; lid_owner: (L,) whose they are
     through: they pierce the wall; otherwise they end in floors
     """
@@ -37,8 +34,6 @@ class Columns:
     bottom: Floats
     start: Ints
     outline: Floats
-    wall: Ints
-    floor: Ints
     lid: Ints
     lid_owner: Ints
     through: bool
@@ -57,6 +52,21 @@ class Columns:
         return np.repeat(np.arange(len(self)), self.count)
 
     @property
+    def side_facet(self) -> Ints:
+        """Number of the facet from each corner to the next, (K,)."""
+        return np.arange(len(self.outline)) + self.owner
+
+    @property
+    def floor_facet(self) -> Ints:
+        """Number of the facet at the end of each, (m,)."""
+        return self.start[1:] + np.arange(len(self))
+
+    @property
+    def facet_feature(self) -> Ints:
+        """The feature each facet belongs to, (K + m,)."""
+        return np.repeat(self.feature, self.count + 1)
+
+    @property
     def following(self) -> Ints:
         """The next corner round, (K,)."""
         following = np.arange(1, len(self.outline) + 1)
@@ -68,6 +78,14 @@ class Columns:
         """How far the outlines go from their axes, (m,)."""
         return np.sqrt(np.maximum.reduceat((self.outline**2).sum(axis=1), self.start[:-1]))
 
+    @property
+    def core(self) -> Floats:
+        """How near the outlines come to their axes, (m,); 0 where an axis is outside."""
+        x, y = self.outline.T
+        along, across = (self.outline[self.following] - self.outline).T
+        apart = (x * across - y * along) / np.hypot(along, across)
+        return np.maximum(np.minimum.reduceat(apart, self.start[:-1]), 0)
+
     def raised(self, corner: Ints, height: Floats) -> Floats:
         """Places in space, (k, 3), of `corner`, (k,), at the heights (k,) above their centres."""
         owner = self.owner[corner]
@@ -77,41 +95,35 @@ class Columns:
 
 def straight(feature: Feature) -> bool:
     """Is it a hole with the same outline from end to end?"""
-    return feature.kind == "hole" and feature.profile != "mesh" and feature.rim == "sharp" and feature.draft == 0
+    return (
+        feature.kind == "hole" and feature.profile != "mesh" and feature.rim == "sharp" and feature.draft == 0
+    )
 
 
 def columns_of(
-    pattern: Pattern, feature: Feature, sizes: FeatureSizes, cutters: Cutters, extent: Extent
+    pattern: Pattern, feature: Feature, sizes: FeatureSizes, chosen: Ints, extent: Extent
 ) -> Columns:
-    """The `straight` features of which `cutters` are the solids.
+    """The columns of the `straight` features `chosen`, (m,); sizes, extent: for all n features.
 
-    pattern: with the features' axes as normals and their headings as tangents; sizes, extent: for all n
-    features
+    pattern: with the features' axes as normals and their headings as tangents. Facets are numbered feature by
+    feature: the sides round, then the floor.
     """
-    facets = np.bincount(cutters.feature, minlength=len(pattern))
-    chosen = np.flatnonzero(facets)
-    count = sides(feature, pattern.diameter)[chosen]
-    flat, triangles, owners = [], [], []
-    for number in np.unique(count):
-        mine = np.flatnonzero(count == number)
-        which = chosen[mine]
-        outline = outlines(feature, pattern.diameter[which], sizes.aspect[which], int(number))
-        flat.append((mine, outline.corners))
-        lid = lids(outline.corners, outline.convex)
-        triangles.append(np.broadcast_to(lid, (len(mine), *lid.shape[-2:])))
-        owners.append(mine)
+    asked = sides(feature, pattern.diameter)[chosen] if len(chosen) else chosen
+    groups = []
     corners = np.zeros(len(chosen), dtype=np.int64)
-    for mine, outline in flat:
-        corners[mine] = outline.shape[1]
+    for number in np.unique(asked):
+        mine = np.flatnonzero(asked == number)
+        outline = outlines(feature, pattern.diameter[chosen[mine]], sizes.aspect[chosen[mine]], int(number))
+        flat = outline.corners
+        corners[mine] = flat.shape[1]
+        groups.append((mine, flat, lids(flat, outline.convex)))
     start = np.concatenate([[0], np.cumsum(corners)])
-    places = np.empty((start[-1], 2))
-    for mine, outline in flat:
-        places[start[mine][:, None] + np.arange(outline.shape[1])] = outline
-    first = np.empty(len(pattern), dtype=np.int64)
-    first[cutters.feature[::-1]] = np.arange(len(cutters.feature))[::-1]
-    ends = np.flatnonzero(cutters.cap < 0)
-    floor = np.empty(len(pattern), dtype=np.int64)
-    floor[cutters.feature[ends]] = ends
+    place = np.zeros((start[-1], 2))
+    lid, owner = [np.zeros((0, 3), dtype=np.int64)], [chosen[:0]]
+    for mine, flat, shape in groups:
+        place[start[mine][:, None] + np.arange(flat.shape[1])] = flat
+        lid.append((shape + start[mine][:, None, None]).reshape(-1, 3))
+        owner.append(np.repeat(mine, shape.shape[-2]))
     return Columns(
         feature=chosen,
         centre=pattern.position[chosen],
@@ -119,14 +131,8 @@ def columns_of(
         top=extent.top[chosen],
         bottom=extent.bottom[chosen],
         start=start,
-        outline=places,
-        wall=first[chosen],
-        floor=floor[chosen],
-        lid=np.concatenate(
-            [(lid + start[mine][:, None, None]).reshape(-1, 3) for lid, mine in zip(triangles, owners, strict=True)]
-        ),
-        lid_owner=np.concatenate(
-            [np.repeat(mine, lid.shape[1]) for lid, mine in zip(triangles, owners, strict=True)]
-        ),
+        outline=place,
+        lid=np.concatenate(lid),
+        lid_owner=np.concatenate(owner),
         through=feature.through,
     )

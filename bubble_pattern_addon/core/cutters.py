@@ -24,15 +24,6 @@ class Cutters:
     feature: Ints
     cap: Ints
 
-    def without(self, features: Ints) -> Cutters:
-        """All but the solids of these features, (k,), with the facets numbered as before."""
-        gone = np.zeros(int(self.feature.max(initial=-1)) + 1, dtype=bool)
-        gone[features] = True
-        left = np.flatnonzero(~gone[self.feature[self.facet]])
-        used, triangles = np.unique(self.mesh.triangles[left], return_inverse=True)
-        mesh = Mesh(self.mesh.vertices[used], triangles.reshape(-1, 3))
-        return Cutters(mesh, self.facet[left], self.feature, self.cap)
-
 
 Group = tuple[Floats, Ints, Ints, Ints, Ints]
 """Solids alike in their facets: corners (m, v, 3), triangles (t, 3) or (m, t, 3), the facet of each triangle

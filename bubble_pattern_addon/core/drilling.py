@@ -8,6 +8,8 @@ time. It leaves to the boolean what needs exact decisions: the columns whose tra
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from .column_walls import walls
@@ -18,20 +20,29 @@ from .remainders import Points, remainder
 from .tracing import Traces, traced
 
 
-def drilled(base: Mesh, columns: Columns, owner: Ints, triangle: Ints, low: Floats, high: Floats) -> tuple[Cut, Ints]:
-    """`base` less those of its `columns` whose outlines can be traced without doubt; and which these are, rows
-    of columns, (d,).
+class Spans(NamedTuple):
+    """What columns see of a base: every face with a part inside a column's cylinder at its heights, and the
+    lowest and highest place of that part above the column's centre; all (k,).
+    """
 
-    owner, triangle, low, high: (k,) every face with a part inside a column's cylinder at its heights, and the
-    lowest and highest place of that part
+    owner: Ints
+    triangle: Ints
+    low: Floats
+    high: Floats
+
+
+def drilled(base: Mesh, columns: Columns, spans: Spans) -> tuple[Cut, Ints]:
+    """`base` less those of its `columns` whose outlines can be traced without doubt; and which these are,
+    rows of columns, (d,).
     """
     nothing = np.zeros(0, dtype=np.int64)
-    none = Cut(base, np.arange(len(base.triangles)), nothing), nothing
+    none = Cut(base, np.arange(len(base.triangles)), nothing, columns.facet_feature), nothing
     if not len(columns):
         return none
     clear = np.ones(len(columns), dtype=bool)
-    clear[owner[(high > columns.top[owner]) | (low < -columns.bottom[owner])]] = False
-    traces = traced(base, columns, clear, owner, triangle)
+    past = (spans.high > columns.top[spans.owner]) | (spans.low < -columns.bottom[spans.owner])
+    clear[spans.owner[past]] = False
+    traces = traced(base, columns, clear, spans.owner, spans.triangle)
     points = _points(base, columns, traces)
     left = remainder(base, columns, traces, points)
     if left is None:
@@ -42,7 +53,8 @@ def drilled(base: Mesh, columns: Columns, owner: Ints, triangle: Ints, low: Floa
     used = np.zeros(len(points.place), dtype=bool)
     used[triangles] = True
     number = np.cumsum(used) - 1
-    return Cut(Mesh(points.place[used], number[triangles]), face, facet), np.flatnonzero(traces.good)
+    cut = Cut(Mesh(points.place[used], number[triangles]), face, facet, columns.facet_feature)
+    return cut, np.flatnonzero(traces.good)
 
 
 def _points(base: Mesh, columns: Columns, traces: Traces) -> Points:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .cycles import followed
 from .mesh import Bools, Ints
 from .ranking import ranked
 
@@ -77,9 +78,11 @@ def _discs(triangles: Ints, facet: Ints) -> Faces:
     first[owner[::-1]] = rim[::-1]
     # a disc has two more edges than triangles, if all its vertices are on the rim
     discs = np.flatnonzero((total == count + 2) & (count > 0))
-    sides, simple = _outlines(_following(opposite, rim), first[discs], total[discs])
+    sides = followed(_following(opposite, rim), first[discs], total[discs])
     corner = triangles.ravel()[sides]
-    simple &= _once(corner, total[discs])
+    # going round twice takes a rim in several pieces
+    again = np.repeat(np.arange(len(discs)), total[discs])[sides == np.repeat(first[discs], total[discs])]
+    simple = (np.bincount(again, minlength=len(discs)) == 1) & _once(corner, total[discs])
     corner = corner[np.repeat(simple, total[discs])]
     discs = discs[simple]
     whole = np.zeros(len(count), dtype=bool)
@@ -124,22 +127,6 @@ def _following(opposite: Ints, rim: Ints) -> Ints:
 def _next(side: Ints) -> Ints:
     """The next side of the same triangle."""
     return np.where(side % 3 == 2, side - 2, side + 1)
-
-
-def _outlines(following: Ints, first: Ints, total: Ints) -> tuple[Ints, Bools]:
-    """The `total`, (n,), sides that follow each other from each `first`, (n,), end to end; and whether it is
-    only after these that the first one comes again, (n,).
-    """
-    start = np.cumsum(total) - total
-    sides, simple = np.empty(total.sum(), dtype=np.int64), np.ones(len(first), dtype=bool)
-    under_way, side, step = np.arange(len(first)), first, 0
-    while len(under_way):
-        sides[start[under_way] + step] = side
-        side, step = following[side], step + 1
-        more = total[under_way] > step
-        under_way, side = under_way[more], side[more]
-        simple[under_way] &= side != first[under_way]
-    return sides, simple
 
 
 def _once(corner: Ints, total: Ints) -> Bools:

@@ -44,12 +44,14 @@ class Cut:
 
     mesh: its triangles on the base come first, then those the cutters made
     face: (F,) face of the base each of the first triangles lies on
-    facet: (W,) facet of the cutters each of the others lies on
+    facet: (W,) flat facet of a feature each of the others lies on
+    feature: (facets,) feature each facet belongs to
     """
 
     mesh: Mesh
     face: Ints
     facet: Ints
+    feature: Ints
 
     @property
     def surface(self) -> Ints:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from .collision import colliding
+from .columns import Columns, columns_of, straight
 from .cutters import Cutters
 from .errors import RecipeError
 from .feature import make_cutters
@@ -26,8 +28,10 @@ from .wall import Fault, NearWall, near_wall
 
 @dataclass(frozen=True)
 class Plan:
-    """What will be cut or added: the base made ready, its near walls, and the features that can be, as
-    solids; the pattern with their axes for normals, and the surface's normals, (n, 3).
+    """What will be cut or added: the base made ready, its near walls, and how far the features reach; the
+    pattern with their axes for normals, and the surface's normals, (n, 3).
+
+    stamp: of a feature with the profile "mesh"; columns: of straight features, None for others
     """
 
     feature: Feature
@@ -39,7 +43,26 @@ class Plan:
     wall: NearWall
     fault: Ints
     extent: Extent
-    cutters: Cutters
+    columns: Columns | None
+
+    @property
+    def chosen(self) -> Ints:
+        """The features that can be made, rising, (m,)."""
+        return np.flatnonzero(self.fault == Fault.NONE)
+
+    @cached_property
+    def cutters(self) -> Cutters:
+        """These features as solids."""
+        return self.solids(self.chosen)
+
+    def solids(self, chosen: Ints) -> Cutters:
+        """The features `chosen`, (k,), as solids."""
+        feature, pattern, extent = self.feature, self.pattern, self.extent
+        if feature.plain:
+            return make_cutters(pattern, feature, chosen, extent.top[chosen], extent.bottom[chosen])
+        if self.stamp is not None:
+            return make_stamps(pattern, feature, self.sizes, self.stamp, chosen, extent)
+        return make_solids(pattern, feature, self.sizes, chosen, extent)
 
     @property
     def meets(self) -> Bools:
@@ -68,14 +91,13 @@ def plan_steps(base: Mesh, pattern: Pattern, feature: Feature, stamp: Mesh | Non
     extent, fault = fitted(feature, sizes, pattern, wall, normal)
     fault[colliding(reach, np.flatnonzero(fault == Fault.NONE), extent.top, extent.bottom)] = Fault.MEETS
     yield Progress("Shaping cutters", 0.2)
-    chosen = np.flatnonzero(fault == Fault.NONE)
-    if feature.plain:
-        cutters = make_cutters(pattern, feature, chosen, extent.top[chosen], extent.bottom[chosen])
-    elif shape is not None:
-        cutters = make_stamps(pattern, feature, sizes, shape, chosen, extent)
-    else:
-        cutters = make_solids(pattern, feature, sizes, chosen, extent)
-    return Plan(feature, pattern, normal, sizes, shape, sound, wall, fault, extent, cutters)
+    columns = None
+    if straight(feature):
+        columns = columns_of(pattern, feature, sizes, np.flatnonzero(fault == Fault.NONE), extent)
+    plan = Plan(feature, pattern, normal, sizes, shape, sound, wall, fault, extent, columns)
+    if columns is None:
+        _ = plan.cutters
+    return plan
 
 
 def _reaching(pattern: Pattern, feature: Feature) -> Pattern:

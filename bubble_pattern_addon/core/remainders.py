@@ -2,13 +2,14 @@
 
 What is left of a face is bounded by pieces of its sides, out of the columns, and by the ways of the outlines
 over it, against their direction. Each begins where another ends, so they link up to polygons; an outline that
-lies in one face all round is a hole in that face's polygon. manifold3d triangulates all polygons at once, laid
-out side by side.
+lies in one face all round is a hole in that face's polygon. manifold3d triangulates all polygons at once,
+laid out side by side.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import manifold3d
 import numpy as np
@@ -16,7 +17,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from .columns import Columns
-from .mesh import Bools, Floats, Ints, Mesh
+from .cycles import followed, ranges
+from .mesh import Floats, Ints, Mesh
 from .ranking import numbered, ranked
 from .tracing import Traces
 
@@ -43,11 +45,10 @@ class Points:
     crossings: int
 
 
-@dataclass(frozen=True)
-class _Runs:
+class _Runs(NamedTuple):
     """Directed pieces of boundaries, h of them: from a vertex to another on a face, with the corners between.
 
-    face, start, end: (h,); corner: (h,) name of the first corner after the start, one of `count`, (h,), that
+    face, start, end: (h,); corner: (h,) name of the first corner after the start, one of `number`, (h,), that
     run up or down by `step` (h,) round an outline, whose names are `ring` and the `size` - 1 that follow
     """
 
@@ -55,14 +56,13 @@ class _Runs:
     start: Ints
     end: Ints
     corner: Ints
-    count: Ints
+    number: Ints
     step: Ints
     ring: Ints
     size: Ints
 
 
-@dataclass(frozen=True)
-class _Polygons:
+class _Polygons(NamedTuple):
     """Polygons: `vertex` (P,) one after the other, `total` (p,) of each, on the faces `face` (p,), with their
     interior to the left.
     """
@@ -84,7 +84,9 @@ def remainder(base: Mesh, columns: Columns, traces: Traces, points: Points) -> t
     sides = _sides(base, traces, points, np.flatnonzero(touched))
     if sides is None:
         return None
-    polygons = _linked(_joined(sides, _arcs(columns, traces, points)), len(points.place))
+    arcs = _arcs(columns, traces, points)
+    runs = _Runs(*(np.concatenate(both) for both in zip(sides, arcs, strict=True)))
+    polygons = _linked(runs, len(points.place))
     if polygons is None:
         return None
     holes = _holes(columns, traces, points)
@@ -100,18 +102,18 @@ def _sides(base: Mesh, traces: Traces, points: Points, faces: Ints) -> _Runs | N
     start, end = base.triangles[faces].ravel(), np.roll(base.triangles[faces], -1, axis=1).ravel()
     owner = np.repeat(faces, 3)
     count = len(base.vertices)
-    bits = (count * count).bit_length()
-    keys, edge = numbered(traces.low * count + traces.high, bits)
-    pieces, first = _outside(traces, points, edge, len(keys))
-    if pieces is None:
+    keys, edge = numbered(traces.low * count + traces.high, (count * count).bit_length())
+    found = _outside(traces, points, edge, len(keys))
+    if found is None:
         return None
+    pieces, first = found
     wanted = np.minimum(start, end) * count + np.maximum(start, end)
-    row = np.minimum(np.searchsorted(keys, wanted), max(len(keys) - 1, 0))
-    cut = keys[row] == wanted if len(keys) else np.zeros(len(wanted), dtype=bool)
+    row = np.searchsorted(keys, wanted)
+    cut = np.append(keys, -1)[row] == wanted
     whole = np.flatnonzero(~cut & ~traces.inside[start])
-    number = np.where(cut, np.diff(first)[row], 0) if len(keys) else np.zeros(len(wanted), dtype=np.int64)
-    side = np.repeat(np.arange(len(wanted)), number)
-    piece = pieces[_ranges(first[row[cut]], number[cut])]
+    side, row = np.flatnonzero(cut), row[cut]
+    number = first[row + 1] - first[row]
+    piece, side = pieces[ranges(first[row], number)], np.repeat(side, number)
     turned = start[side] > end[side]
     piece[turned] = piece[turned][:, ::-1]
     none = np.zeros(len(whole) + len(side), dtype=np.int64)
@@ -123,9 +125,9 @@ def _sides(base: Mesh, traces: Traces, points: Points, faces: Ints) -> _Runs | N
     )
 
 
-def _outside(traces: Traces, points: Points, edge: Ints, count: int) -> tuple[Ints, Ints] | tuple[None, None]:
+def _outside(traces: Traces, points: Points, edge: Ints, count: int) -> tuple[Ints, Ints] | None:
     """Pieces of `count` crossed edges that are out of the columns, from low to high, (n, 2), and where those
-    of each edge begin, (count + 1,). edge: (X,) which one each crossing is on
+    of each edge begin, (count + 1,); None where columns overlap. edge: (X,) which one each crossing is on
     """
     crossing = np.lexsort((traces.share, edge))
     edge, leaves = edge[crossing], traces.leaves[crossing]
@@ -133,24 +135,20 @@ def _outside(traces: Traces, points: Points, edge: Ints, count: int) -> tuple[In
     # an edge that does not begin in a column does as if it came out of one, and likewise at its end
     from_low = np.flatnonzero(~leaves[first])
     to_high = np.flatnonzero(leaves[last - 1])
-    name = np.concatenate([
-        traces.low[crossing[first[from_low]]],
-        points.crossings + crossing,
-        traces.high[crossing[first[to_high]]],
-    ])
+    name = np.concatenate(
+        [
+            traces.low[crossing[first[from_low]]],
+            points.crossings + crossing,
+            traces.high[crossing[first[to_high]]],
+        ]
+    )
     out = np.concatenate([np.ones(len(from_low), dtype=bool), leaves, np.zeros(len(to_high), dtype=bool)])
     owner = np.concatenate([from_low, edge, to_high])
     order = np.argsort(owner, kind="stable")
     name, out, owner = name[order], out[order], owner[order]
     if len(out) % 2 or not out[0::2].all() or out[1::2].any() or (owner[0::2] != owner[1::2]).any():
-        return None, None
+        return None
     return name.reshape(-1, 2), np.searchsorted(owner[0::2], np.arange(count + 1))
-
-
-def _ranges(start: Ints, number: Ints) -> Ints:
-    """`number`, (n,), whole numbers from each `start`, (n,), on, end to end."""
-    before = np.cumsum(number) - number
-    return np.arange(number.sum()) + np.repeat(start - before, number)
 
 
 def _arcs(columns: Columns, traces: Traces, points: Points) -> _Runs:
@@ -166,12 +164,8 @@ def _arcs(columns: Columns, traces: Traces, points: Points) -> _Runs:
     # behind, as it is, over the near side the other way round
     start = points.crossings + np.where(below, np.arange(len(there)), there)
     end = points.crossings + np.where(below, there, np.arange(len(there)))
-    corner = ring + np.where(below, offset + 1, offset + count) % size
+    corner = ring + np.mod(np.where(below, offset + 1, offset + count), size)
     return _Runs(traces.into, start, end, corner, count, np.where(below, 1, -1), ring, size)
-
-
-def _joined(one: _Runs, other: _Runs) -> _Runs:
-    return _Runs(*(np.concatenate([getattr(runs, name) for runs in (one, other)]) for name in _Runs.__annotations__))
 
 
 def _linked(runs: _Runs, names: int) -> _Polygons | None:
@@ -184,33 +178,22 @@ def _linked(runs: _Runs, names: int) -> _Polygons | None:
         return None
     following = np.empty(number, dtype=np.int64)
     following[from_end] = from_start
-    graph = coo_array((np.ones(number, dtype=np.int8), (np.arange(number), following)), shape=(number, number))
+    graph = coo_array(
+        (np.ones(number, dtype=np.int8), (np.arange(number), following)), shape=(number, number)
+    )
     parts, label = connected_components(graph, directed=False)
     total = np.bincount(label, minlength=parts)
     first = np.empty(parts, dtype=np.int64)
     first[label[::-1]] = np.arange(number)[::-1]
-    order = _round(following, first, total)
+    order = followed(following, first, total)
     # a run is its start and then its corners
-    count = runs.count[order] + 1
+    count = runs.number[order] + 1
     run = np.repeat(order, count)
-    place = _ranges(np.zeros(len(order), dtype=np.int64), count)
+    place = ranges(np.zeros(len(order), dtype=np.int64), count)
     around = runs.corner[run] - runs.ring[run] + runs.step[run] * (place - 1)
     vertex = np.where(place == 0, runs.start[run], runs.ring[run] + around % np.maximum(runs.size[run], 1))
     corners = np.add.reduceat(count, np.cumsum(total) - total) if number else total
     return _Polygons(vertex, corners, runs.face[first])
-
-
-def _round(following: Ints, first: Ints, total: Ints) -> Ints:
-    """The `total`, (n,), runs that follow each other from each `first`, (n,), end to end."""
-    start = np.cumsum(total) - total
-    order = np.empty(total.sum(), dtype=np.int64)
-    under_way, run, step = np.arange(len(first)), first, 0
-    while len(under_way):
-        order[start[under_way] + step] = run
-        step += 1
-        more = total[under_way] > step
-        under_way, run = under_way[more], following[run[more]]
-    return order
 
 
 def _holes(columns: Columns, traces: Traces, points: Points) -> _Polygons:
@@ -222,7 +205,7 @@ def _holes(columns: Columns, traces: Traces, points: Points) -> _Polygons:
     size = columns.count[column]
     ring = np.where(below, points.lower, points.corners) + columns.start[column]
     forward = np.repeat(below == 1, size)
-    place = _ranges(np.zeros(len(way), dtype=np.int64), size)
+    place = ranges(np.zeros(len(way), dtype=np.int64), size)
     place = np.where(forward, place, np.repeat(size, size) - 1 - place)
     return _Polygons(np.repeat(ring, size) + place, size, traces.begin[way])
 
@@ -234,7 +217,7 @@ def _triangulated(base: Mesh, points: Points, outer: _Polygons, holes: _Polygons
     pierced = np.zeros(len(base.triangles), dtype=bool)
     pierced[holes.face] = True
     pierced = pierced[outer.face]
-    all_of = _Polygons(*(np.concatenate([getattr(some, name) for some in (outer, holes)]) for name in _Polygons.__annotations__))
+    all_of = _Polygons(*(np.concatenate(both) for both in zip(outer, holes, strict=True)))
     flat, cell = _flattened(base, points, all_of)
     wide = int(np.ceil(np.sqrt(cell.max(initial=0) + 1)))
     laid = flat + APART * np.repeat(np.stack([cell % wide, cell // wide], axis=1), all_of.total, axis=0)
@@ -250,7 +233,7 @@ def _triangulated(base: Mesh, points: Points, outer: _Polygons, holes: _Polygons
     for batch in batches:
         contours = [laid[bounds[which] : bounds[which + 1]] for which in batch]
         triangles = np.asarray(manifold3d.triangulate(contours), dtype=np.int64).reshape(-1, 3)
-        found.append(_ranges(bounds[batch], all_of.total[batch])[triangles])
+        found.append(ranges(bounds[batch], all_of.total[batch])[triangles])
     corner = np.concatenate([*found, np.zeros((0, 3), dtype=np.int64)])
     if not _covering(flat, corner, owner, cell, bounds):
         return None

@@ -8,9 +8,9 @@ import manifold3d
 import numpy as np
 
 from . import carry
-from .columns import columns_of, straight
+from .columns import Columns
 from .cutters import Cutters
-from .drilling import drilled
+from .drilling import Spans, drilled
 from .elsewhere import elsewhere
 from .errors import BaseError
 from .feature_recipe import Feature
@@ -25,6 +25,8 @@ from .verdict import judge
 
 SECONDS = 4e-6
 """What the boolean takes for each triangle of the base and the cutters, measured on two cores of 2020."""
+DRILLING = 2e-6
+"""What drilling takes for each triangle of the base and the cutters that there would be."""
 
 
 def part_steps(
@@ -61,13 +63,16 @@ def part_steps(
 
 
 def cutting_seconds(plan: Plan) -> float:
-    """What the boolean of `plan` takes, roughly: within a factor of three on most machines of its time."""
-    return SECONDS * (len(plan.sound.mesh.triangles) + len(plan.cutters.mesh.triangles))
+    """What cutting takes, roughly: within a factor of three on most machines of its time."""
+    base = len(plan.sound.mesh.triangles)
+    if plan.columns is not None:
+        return DRILLING * (base + 4 * len(plan.columns.outline))
+    return SECONDS * (base + len(plan.cutters.mesh.triangles))
 
 
 def cut(plan: Plan) -> Cut:
-    """What `plan` leaves of its base: straight holes are drilled, see core.drilling, what cannot be is left to
-    one boolean, see `combine`; and so is everything where many holes crowd one face, which is split for it.
+    """What `plan` leaves of its base: straight holes are drilled, see core.drilling; what can't be is left to
+    one boolean, see `combine`, and so is everything where many holes crowd one face, which is split for it.
     """
     wall, base = plan.wall, plan.sound.mesh
     through = np.flatnonzero(plan.meets & np.isfinite(wall.seen_axis))
@@ -75,31 +80,34 @@ def cut(plan: Plan) -> Cut:
     pattern = plan.pattern
     place = pattern.position[feature] + wall.seen_axis[through, None] * pattern.normal[feature]
     split, piece = split_crowded(base, wall.seen_triangle[through], place, _room(plan)[feature])
-    if split is not base or not straight(plan.feature) or not len(plan.cutters.facet):
+    if plan.columns is None or split is not base:
         return combine(split, piece, plan.cutters, plan.feature.adds)
-    return _drilled(plan)
+    return _drilled(plan, plan.columns)
 
 
-def _drilled(plan: Plan) -> Cut:
-    columns = columns_of(plan.pattern, plan.feature, plan.sizes, plan.cutters, plan.extent)
-    wall, seen = plan.wall, np.flatnonzero(plan.meets)
+def _drilled(plan: Plan, columns: Columns) -> Cut:
+    """The base of `plan` less its columns, those that can't be drilled by the boolean."""
+    wall, seen, base = plan.wall, np.flatnonzero(plan.meets), plan.sound.mesh
     row = np.full(len(plan.pattern), -1)
     row[columns.feature] = np.arange(len(columns))
-    owner = row[wall.seen_feature[seen]]
-    heights = wall.seen_low[seen], wall.seen_high[seen]
-    left, done = drilled(plan.sound.mesh, columns, owner, wall.seen_triangle[seen], *heights)
+    spans = Spans(
+        row[wall.seen_feature[seen]], wall.seen_triangle[seen], wall.seen_low[seen], wall.seen_high[seen]
+    )
+    left, done = drilled(base, columns, spans)
     if len(done) == len(columns):
         return left
     # faces of the base and walls of the drilled holes are told apart by their numbers
-    count = len(plan.sound.mesh.triangles)
-    rest = plan.cutters.without(columns.feature[done])
-    last = combine(left.mesh, np.concatenate([left.face, count + left.facet]), rest)
-    walls = last.face >= count
-    order = np.concatenate([np.flatnonzero(~walls), np.flatnonzero(walls), np.arange(len(walls), len(last.mesh.triangles))])
+    first, known = len(base.triangles), len(left.feature)
+    rest = plan.solids(np.delete(columns.feature, done))
+    last = combine(left.mesh, np.concatenate([left.face, first + left.facet]), rest)
+    drill = last.face >= first
+    base_first = np.argsort(drill, kind="stable")
+    order = np.concatenate([base_first, np.arange(len(drill), len(last.mesh.triangles))])
     return Cut(
         Mesh(last.mesh.vertices, last.mesh.triangles[order]),
-        last.face[~walls],
-        np.concatenate([last.face[walls] - count, last.facet]),
+        last.face[~drill],
+        np.concatenate([last.face[drill] - first, known + last.facet]),
+        np.concatenate([left.feature, last.feature]),
     )
 
 
@@ -125,7 +133,7 @@ def combine(base: Mesh, face: Ints, cutters: Cutters, adds: bool = False) -> Cut
     """
     none = np.zeros(0, dtype=np.int64)
     if len(cutters.facet) == 0:
-        return Cut(base, face, none)
+        return Cut(base, face, none, none)
     first = manifold3d.Manifold.reserve_ids(2)
     whole, solids = _manifold(base, face, first), _manifold(cutters.mesh, cutters.facet, first + 1)
     result = whole + solids if adds else whole - solids
@@ -143,7 +151,7 @@ def combine(base: Mesh, face: Ints, cutters: Cutters, adds: bool = False) -> Cut
 
     order = np.concatenate([triangles[:0], *of(first, triangles), *of(first + 1, triangles)])
     on_base, on_cutters = (np.concatenate([none, *of(name, identity)]) for name in (first, first + 1))
-    return Cut(Mesh(np.array(out.vert_properties), order), on_base, on_cutters)
+    return Cut(Mesh(np.array(out.vert_properties), order), on_base, on_cutters, cutters.feature)
 
 
 def _manifold(mesh: Mesh, facet: Ints, name: int) -> manifold3d.Manifold:

@@ -11,7 +11,9 @@ wall's two sides.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,7 +21,7 @@ from .columns import Columns
 from .mesh import Bools, Floats, Ints, Mesh
 from .ranking import numbered
 
-DOUBT = 1e-6
+DOUBT = 1e-8
 """Share of its reach within which a column takes two places for the same, and a sign for doubtful."""
 STEEPEST = 1e-3
 """Cosine of the angle between an axis and a face's normal below which the face stands upright."""
@@ -29,14 +31,14 @@ TOGETHER = 1 << 22
 
 @dataclass(frozen=True)
 class Traces:
-    """Ways of outlines over the base, two for each of m columns: 2 c where column c enters, above, and 2 c + 1
-    where it leaves. A through-hole has both, others the first.
+    """Ways of outlines over the base, two for each of m columns: 2 c where column c enters, above, and
+    2 c + 1 where it leaves. A through-hole has both, others the first.
 
     good: (m,) the columns that could be traced; what follows is of these alone
     way: (X,) way each crossing is on, rising; at: (X,) place along the way: the number of the corner before
         and the share of the side from there, rising on each way; first: (X,) it is the first one of its way
-    low, high: (X,) vertices of the edge, low < high; share: (X,) from the one to the other; leaves: (X,) going
-        from low to high, the edge comes out of the column there
+    low, high: (X,) vertices of the edge, low < high; share: (X,) from the one to the other; leaves: (X,)
+        going from low to high, the edge comes out of the column there
     into: (X,) face of the base that the outline enters
     begin: (2 m,) face of the base under the first corner of each way, -1 where there is none
     inside: (V,) vertices of the base inside a column
@@ -70,9 +72,10 @@ class _Seen:
 
     owner, triangle, facing: (k,); corner: (k, 3) rows of places, side: (k, 3) rows of edges, from each corner
         to the next
-    vertex, place_owner: (q,), x, y, z: (q,) in the column's frame
-    low, high: (e,) rows of places, forth, back: (e,) pairs whose faces run along the edge from low to high and
-        from high to low, -1 where there is not just one
+    vertex, place_owner: (q,), x, y: (q,) in the column's frame
+    low, high: (e,) rows of places, forth, back: (e,) pairs whose faces run along the edge from low to high
+        and from high to low, -1 where there is not just one
+    deep: (q,) vertices so near to the axis that they are inside the outline for sure
     """
 
     owner: Ints
@@ -83,15 +86,34 @@ class _Seen:
     place_owner: Ints
     x: Floats
     y: Floats
-    z: Floats
     low: Ints
     high: Ints
     forth: Ints
     back: Ints
+    deep: Bools
 
     @property
     def edge_owner(self) -> Ints:
+        """The column of each edge, (e,)."""
         return self.place_owner[self.low]
+
+    @property
+    def regular(self) -> Bools:
+        """Which edges have a face on either side, both turned the same way, (e,)."""
+        known = (self.forth >= 0) & (self.back >= 0)
+        return known & (self.facing[self.forth] == self.facing[self.back]) & (self.facing[self.forth] != 0)
+
+
+class _Crossings(NamedTuple):
+    """Where outlines cross edges, all (x,): rows of edges, number of the corner before, share of the side
+    from there, share of the edge from low to high, and whether that comes out of the column there.
+    """
+
+    edge: Ints
+    corner: Ints
+    along: Floats
+    share: Floats
+    leaves: Bools
 
 
 def traced(base: Mesh, columns: Columns, clear: Bools, owner: Ints, triangle: Ints) -> Traces:
@@ -100,17 +122,37 @@ def traced(base: Mesh, columns: Columns, clear: Bools, owner: Ints, triangle: In
     owner, triangle: (k,) every face with a part inside a column's cylinder, at its heights
     """
     seen = _seen(base, columns, owner, triangle)
+    touching, regular = _touching(seen, columns.reach), seen.regular
     good = clear.copy()
-    touching = _touching(seen, columns.reach)
-    regular = (seen.forth >= 0) & (seen.back >= 0)
-    regular &= (seen.facing[seen.forth] == seen.facing[seen.back]) & (seen.facing[seen.forth] != 0)
     good[seen.edge_owner[touching & ~regular]] = False
-    begin = _begin(seen, columns, good)
-    inside = _inside(seen, columns, good)
-    edges = np.flatnonzero(touching & regular & good[seen.edge_owner])
-    edge, corner = _passed(seen, columns, edges, good)
-    crossings = _crossings(seen, columns, edge, corner)
-    return _ordered(seen, len(base.vertices), good, begin, inside, *crossings)
+    begin, single = _begin(seen, columns)
+    inside, on_outline = _inside(seen, columns)
+    good &= single
+    good[on_outline] = False
+    # an edge with both ends deep inside never reaches the outline
+    passing = touching & regular & ~(seen.deep[seen.low] & seen.deep[seen.high])
+    edge, corner, on_edge = _passed(seen, columns, np.flatnonzero(passing & good[seen.edge_owner]))
+    good[on_edge] = False
+    crossings, way = _ordered(seen, _crossings(seen, columns, edge, corner))
+    into, out_of = _either_side(seen, crossings)
+    good[_apart(way, into, out_of, begin)] = False
+    kept = np.flatnonzero(good[way // 2])
+    edge, way = crossings.edge[kept], way[kept]
+    within = np.zeros(len(base.vertices), dtype=bool)
+    within[seen.vertex[inside[good[seen.place_owner[inside]]]]] = True
+    return Traces(
+        good=good,
+        way=way,
+        at=(crossings.corner + crossings.along)[kept],
+        first=np.diff(way, prepend=-1) != 0,
+        low=seen.vertex[seen.low[edge]],
+        high=seen.vertex[seen.high[edge]],
+        share=crossings.share[kept],
+        leaves=crossings.leaves[kept],
+        into=triangle[into[kept]],
+        begin=np.where((begin >= 0) & np.repeat(good, 2), triangle[begin], -1),
+        inside=within,
+    )
 
 
 def _seen(base: Mesh, columns: Columns, owner: Ints, triangle: Ints) -> _Seen:
@@ -119,25 +161,32 @@ def _seen(base: Mesh, columns: Columns, owner: Ints, triangle: Ints) -> _Seen:
     key, corner = numbered((owner[:, None] * count + base.triangles[triangle]).ravel(), bits)
     corner = corner.reshape(-1, 3)
     place_owner, vertex = np.divmod(key, count)
-    offset = (base.vertices[vertex] - columns.centre[place_owner]).T
-    frame = columns.frame.transpose(1, 2, 0)
-    x, y, z = (sum(row[place_owner] * way for row, way in zip(rows, offset, strict=True)) for rows in frame)
+    dx, dy, dz = (base.vertices[vertex] - columns.centre[place_owner]).T
+    # a row per axis of the frame and coordinate, several times faster to pick from
+    frame = np.ascontiguousarray(columns.frame.transpose(1, 2, 0))
+    x, y, z = (a[place_owner] * dx + b[place_owner] * dy + c[place_owner] * dz for a, b, c in frame)
     start, end = corner.ravel(), np.roll(corner, -1, axis=1).ravel()
     bits = len(key).bit_length()
     pairs, edge = numbered((np.minimum(start, end) << bits) | np.maximum(start, end), 2 * bits)
     low, high = pairs >> bits, pairs & ((1 << bits) - 1)
     forth, back = (_only(edge, run, len(pairs)) for run in (start < end, start > end))
-    a, b, c = corner.T
-    ux, uy, uz = x[b] - x[a], y[b] - y[a], z[b] - z[a]
-    vx, vy, vz = x[c] - x[a], y[c] - y[a], z[c] - z[a]
+    facing = _facing(*(axis[corner.T] for axis in (x, y, z)))
+    deep = np.hypot(x, y) < columns.core[place_owner] * (1 - DOUBT)
+    return _Seen(owner, triangle, facing, corner, vertex, place_owner, x, y, low, high, forth, back, deep)
+
+
+def _facing(x: Floats, y: Floats, z: Floats) -> Ints:
+    """1 for faces turned up, -1 down, 0 upright, (k,); coordinates of their corners (3, k)."""
+    (ux, vx), (uy, vy), (uz, vz) = (axis[1:] - axis[0] for axis in (x, y, z))
     up = ux * vy - uy * vx
     size = np.sqrt((uy * vz - uz * vy) ** 2 + (uz * vx - ux * vz) ** 2 + up**2)
-    facing = np.where(np.abs(up) > STEEPEST * size, np.sign(up), 0).astype(np.int64)
-    return _Seen(owner, triangle, facing, corner, vertex, place_owner, x, y, z, low, high, forth, back)
+    return np.where(np.abs(up) > STEEPEST * size, np.sign(up), 0).astype(np.int64)
 
 
 def _only(edge: Ints, chosen: Bools, count: int) -> Ints:
-    """The pair of the one `chosen` side, (3 k,), that lies on each of `count` edges; -1 for none or several."""
+    """The pair of the one `chosen` side, (3 k,), that lies on each of `count` edges; -1 where not just one
+    does.
+    """
     sides = np.flatnonzero(chosen)
     pair = np.full(count, -1)
     pair[edge[sides]] = sides // 3
@@ -152,12 +201,12 @@ def _touching(seen: _Seen, reach: Floats) -> Bools:
     square = dx * dx + dy * dy
     share = np.clip(-(ax * dx + ay * dy) / np.where(square > 0, square, 1), 0, 1)
     near = np.hypot(ax + share * dx, ay + share * dy)
-    return near <= reach[seen.edge_owner] * (1 + DOUBT)
+    return np.asarray(near <= reach[seen.edge_owner] * (1 + DOUBT))
 
 
-def _begin(seen: _Seen, columns: Columns, good: Bools) -> Ints:
-    """The pair under the first corner of each way, (2 m,), -1 for none; columns with more or fewer ways than
-    they should have are not `good`.
+def _begin(seen: _Seen, columns: Columns) -> tuple[Ints, Bools]:
+    """The pair under the first corner of each way, (2 m,), -1 for none; and which columns have the ways that
+    they should have, each once, (m,).
     """
     x, y = columns.outline[columns.start[:-1]].T
     x, y = x[seen.owner], y[seen.owner]
@@ -166,15 +215,14 @@ def _begin(seen: _Seen, columns: Columns, good: Bools) -> Ints:
         start, end = seen.corner[:, one], seen.corner[:, other]
         # the same sign for both faces at an edge
         low, high = np.minimum(start, end), np.maximum(start, end)
-        side = _side(seen.x[low], seen.y[low], seen.x[high], seen.y[high], x, y) > 0
-        covers &= (side == (start < end)) == (seen.facing > 0)
+        left = _side(seen.x[low], seen.y[low], seen.x[high], seen.y[high], x, y) > 0
+        covers &= (left == (start < end)) == (seen.facing > 0)
     pair = np.flatnonzero(covers)
     way = 2 * seen.owner[pair] + (seen.facing[pair] < 0)
     found = np.bincount(way, minlength=2 * len(columns))
     begin = np.full(2 * len(columns), -1)
     begin[way] = pair
-    good &= (found[0::2] == 1) & (found[1::2] == int(columns.through))
-    return begin
+    return begin, (found[0::2] == 1) & (found[1::2] == int(columns.through))
 
 
 def _side(ax: Floats, ay: Floats, bx: Floats, by: Floats, x: Floats, y: Floats) -> Floats:
@@ -182,75 +230,74 @@ def _side(ax: Floats, ay: Floats, bx: Floats, by: Floats, x: Floats, y: Floats) 
     return (bx - ax) * (y - ay) - (by - ay) * (x - ax)
 
 
-def _groups(columns: Columns, rows: Ints, owner: Ints) -> list[tuple[int, Ints]]:
-    """`rows`, (k,), by how many corners their `owner`, (k,), has, and a bounded number together."""
+def _groups(columns: Columns, rows: Ints, owner: Ints) -> Iterator[tuple[Ints, Ints]]:
+    """`rows`, (k,), a bounded number together, with the numbers of all corners of their columns `owner`,
+    (k,): (g,) and (g, corners).
+    """
     count = columns.count[owner]
-    groups = []
     for number in np.unique(count):
-        mine = rows[count == number]
+        alike = np.flatnonzero(count == number)
         many = max(TOGETHER // int(number), 1)
-        groups += [(int(number), mine[at : at + many]) for at in range(0, len(mine), many)]
-    return groups
+        for at in range(0, len(alike), many):
+            mine = alike[at : at + many]
+            yield rows[mine], columns.start[owner[mine]][:, None] + np.arange(number)
 
 
-def _inside(seen: _Seen, columns: Columns, good: Bools) -> Ints:
-    """Places inside their column's outline; columns with one on it are not `good`."""
-    reach = columns.reach[seen.place_owner] * (1 + DOUBT)
-    close = np.flatnonzero(np.hypot(seen.x, seen.y) <= reach)
-    found = []
-    for number, rows in _groups(columns, close, seen.place_owner[close]):
-        owner = seen.place_owner[rows]
-        corners = columns.start[owner][:, None] + np.arange(number)
+def _inside(seen: _Seen, columns: Columns) -> tuple[Ints, Ints]:
+    """Places inside their column's outline, and columns with one on it."""
+    near = np.hypot(seen.x, seen.y) <= columns.reach[seen.place_owner] * (1 + DOUBT)
+    close = np.flatnonzero(near & ~seen.deep)
+    inside, doubtful = [np.flatnonzero(seen.deep)], [close[:0]]
+    for rows, corners in _groups(columns, close, seen.place_owner[close]):
         px, py = columns.outline[corners].transpose(2, 0, 1)
         qx, qy = np.roll(px, -1, axis=1), np.roll(py, -1, axis=1)
         x, y = seen.x[rows][:, None], seen.y[rows][:, None]
         side = _side(px, py, qx, qy, x, y)
         # how often the outline goes round the place
         up, down = (py <= y) & (qy > y) & (side > 0), (py > y) & (qy <= y) & (side < 0)
-        found.append(rows[up.sum(axis=1) != down.sum(axis=1)])
-        dx, dy = qx - px, qy - py
-        square = dx * dx + dy * dy
-        along = ((x - px) * dx + (y - py) * dy) / square
-        doubt = DOUBT * columns.reach[owner][:, None]
-        slack = doubt / np.sqrt(square)
-        on = (np.abs(side) <= doubt * np.sqrt(square)) & (along >= -slack) & (along <= 1 + slack)
-        good[owner[on.any(axis=1)]] = False
-    return np.concatenate([*found, np.zeros(0, dtype=np.int64)])
+        inside.append(rows[up.sum(axis=1) != down.sum(axis=1)])
+        owner = seen.place_owner[rows]
+        on = _on(px, py, qx, qy, x, y, side, columns.reach[owner][:, None])
+        doubtful.append(owner[on.any(axis=1)])
+    return np.concatenate(inside), np.concatenate(doubtful)
 
 
-def _passed(seen: _Seen, columns: Columns, edges: Ints, good: Bools) -> tuple[Ints, Ints]:
+def _on(
+    px: Floats, py: Floats, qx: Floats, qy: Floats, x: Floats, y: Floats, side: Floats, reach: Floats
+) -> Bools:
+    """Is a place, on the `side` of the line from p to q, as good as on the way between these?"""
+    dx, dy = qx - px, qy - py
+    square = dx * dx + dy * dy
+    slack = DOUBT * reach * np.sqrt(square)
+    along = (x - px) * dx + (y - py) * dy
+    return np.asarray((np.abs(side) <= slack) & (along >= -slack) & (along <= square + slack))
+
+
+def _passed(seen: _Seen, columns: Columns, edges: Ints) -> tuple[Ints, Ints, Ints]:
     """Where two neighbouring corners of an outline lie on either side of the line through an edge: rows of
-    `edges` and numbers of the first of the two; columns with a corner on an edge are not `good`.
+    `edges` and numbers of the first of the two; and columns with a corner on an edge.
     """
-    found = [(edges[:0], edges[:0])]
-    for number, rows in _groups(columns, edges, seen.edge_owner[edges]):
-        owner = seen.edge_owner[rows]
-        start = columns.start[owner]
-        px, py = columns.outline[start[:, None] + np.arange(number)].transpose(2, 0, 1)
-        ax, ay, bx, by = (axis[end][:, None] for end in (seen.low[rows], seen.high[rows]) for axis in (seen.x, seen.y))
-        side = _side(ax, ay, bx, by, px, py)
-        length = np.hypot(bx - ax, by - ay)
-        doubt = DOUBT * columns.reach[owner][:, None]
-        row, corner = np.nonzero(np.abs(side) <= doubt * length)
-        if len(row):
-            dx, dy = (bx - ax)[row, 0], (by - ay)[row, 0]
-            along = (px[row, corner] - ax[row, 0]) * dx + (py[row, corner] - ay[row, 0]) * dy
-            slack = doubt[row, 0] * length[row, 0]
-            on = (along >= -slack) & (along <= length[row, 0] ** 2 + slack)
-            good[owner[row[on]]] = False
+    edge, first, doubtful = [edges[:0]], [edges[:0]], [edges[:0]]
+    for rows, corners in _groups(columns, edges, seen.edge_owner[edges]):
+        px, py = columns.outline[corners].transpose(2, 0, 1)
+        low, high, owner = seen.low[rows], seen.high[rows], seen.edge_owner[rows]
+        ax, ay, bx, by = seen.x[low], seen.y[low], seen.x[high], seen.y[high]
+        side = _side(ax[:, None], ay[:, None], bx[:, None], by[:, None], px, py)
+        reach = columns.reach[owner]
+        # few are so near to the line at all
+        row, at = np.nonzero(np.abs(side) <= (DOUBT * reach * np.hypot(bx - ax, by - ay))[:, None])
+        ends = ax[row], ay[row], bx[row], by[row]
+        on = _on(*ends, px[row, at], py[row, at], side[row, at], reach[row])
+        doubtful.append(owner[row[on]])
         left = side > 0
-        row, corner = np.nonzero(left != np.roll(left, -1, axis=1))
-        found.append((rows[row], start[row] + corner))
-    edge, corner = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    return edge, corner
+        row, at = np.nonzero(left != np.roll(left, -1, axis=1))
+        edge.append(rows[row])
+        first.append(corners[row, at])
+    return np.concatenate(edge), np.concatenate(first), np.concatenate(doubtful)
 
 
-def _crossings(
-    seen: _Seen, columns: Columns, edge: Ints, corner: Ints
-) -> tuple[Ints, Ints, Floats, Floats, Bools]:
-    """Which of the places that `_passed` found lie on the edges themselves: rows of edges, corners, shares of
-    the outlines' sides and of the edges, and whether the edges come out of the columns there.
-    """
+def _crossings(seen: _Seen, columns: Columns, edge: Ints, corner: Ints) -> _Crossings:
+    """Those of the places that `_passed` found which lie on the edges themselves."""
     px, py = columns.outline[corner].T
     qx, qy = columns.outline[columns.following[corner]].T
     low, high = seen.low[edge], seen.high[edge]
@@ -260,53 +307,28 @@ def _crossings(
     before, after = (_side(ax, ay, bx, by, *ends)[kept] for ends in ((px, py), (qx, qy)))
     from_low, from_high = from_low[kept], from_high[kept]
     share = from_low / (from_low - from_high)
-    return edge[kept], corner[kept], before / (before - after), share, after > 0
+    return _Crossings(edge[kept], corner[kept], before / (before - after), share, after > 0)
 
 
-def _ordered(
-    seen: _Seen,
-    vertices: int,
-    good: Bools,
-    begin: Ints,
-    inside: Ints,
-    edge: Ints,
-    corner: Ints,
-    along: Floats,
-    share: Floats,
-    leaves: Bools,
-) -> Traces:
-    """The crossings by their ways and along them; columns whose ways do not hang together are not good.
+def _ordered(seen: _Seen, crossings: _Crossings) -> tuple[_Crossings, Ints]:
+    """The crossings by the ways they are on and along these; and their ways, (x,)."""
+    way = 2 * seen.edge_owner[crossings.edge] + (seen.facing[seen.forth[crossings.edge]] < 0)
+    order = np.lexsort((crossings.along, crossings.corner, way))
+    edge, corner, along, share, leaves = crossings
+    return _Crossings(edge[order], corner[order], along[order], share[order], leaves[order]), way[order]
 
-    vertices: how many the base has; for the rest see above
-    """
-    facing = seen.facing[seen.forth[edge]]
-    way = 2 * seen.edge_owner[edge] + (facing < 0)
-    order = np.lexsort((along, corner, way))
-    order = order[good[way[order] // 2]]
-    edge, facing, way, leaves = edge[order], facing[order], way[order], leaves[order]
+
+def _either_side(seen: _Seen, crossings: _Crossings) -> tuple[Ints, Ints]:
+    """The pairs whose faces the outlines enter and come from, (x,) and (x,)."""
+    forth, back = seen.forth[crossings.edge], seen.back[crossings.edge]
     # what an outline enters lies to the left of an edge that comes out of the column
-    to_left = np.where(facing > 0, seen.forth[edge], seen.back[edge])
-    to_right = np.where(facing > 0, seen.back[edge], seen.forth[edge])
-    into, out_of = np.where(leaves, to_left, to_right), np.where(leaves, to_right, to_left)
-    first = np.ones(len(way), dtype=bool)
-    first[1:] = way[1:] != way[:-1]
-    last = np.roll(first, -1)
-    hanging = np.where(first, begin[way] == out_of, np.roll(into, 1) == out_of)
-    hanging &= ~last | (into == begin[way])
-    good[way[~hanging] // 2] = False
-    kept = good[way // 2]
-    known = np.zeros(vertices, dtype=bool)
-    known[seen.vertex[inside[good[seen.place_owner[inside]]]]] = True
-    return Traces(
-        good=good,
-        way=way[kept],
-        at=(corner[order] + along[order])[kept],
-        first=first[kept],
-        low=seen.vertex[seen.low[edge[kept]]],
-        high=seen.vertex[seen.high[edge[kept]]],
-        share=share[order][kept],
-        leaves=leaves[kept],
-        into=seen.triangle[into[kept]],
-        begin=np.where((begin >= 0) & np.repeat(good, 2), seen.triangle[begin], -1),
-        inside=known,
-    )
+    ahead = crossings.leaves == (seen.facing[forth] > 0)
+    return np.where(ahead, forth, back), np.where(ahead, back, forth)
+
+
+def _apart(way: Ints, into: Ints, out_of: Ints, begin: Ints) -> Ints:
+    """Columns of which a way does not go on from the face that it has come to."""
+    first = np.diff(way, prepend=-1) != 0
+    together = np.where(first, begin[way], np.roll(into, 1)) == out_of
+    together &= ~np.roll(first, -1) | (into == begin[way])
+    return way[~together] // 2

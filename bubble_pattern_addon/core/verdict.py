@@ -30,7 +30,7 @@ def judge(plan: Plan, left: Cut) -> Part:
         known, named = carry.same_places(sound.mesh.vertices, left.mesh.vertices)
         whole, turn = carry.whole_faces(left.surface, named, left.face, known[sound.mesh.triangles])
         mesh = Mesh(left.mesh.vertices, carry.turned(left.mesh.triangles, turn))
-        owner = plan.cutters.feature[left.facet]
+        owner = left.feature[left.facet]
         source = np.concatenate([sound.triangle[left.face], -1 - owner])
         facet = np.concatenate([np.full(len(left.face), -1), left.facet])
         vertex = np.where(named >= 0, sound.vertex[named], -1)

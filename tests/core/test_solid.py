@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from bubble_pattern_addon.core import solid, splitting
+from bubble_pattern_addon.core import plan, solid, splitting
 from bubble_pattern_addon.core.errors import BaseError, RecipeError
 from bubble_pattern_addon.core.mesh import Mesh
 from bubble_pattern_addon.core.part import Cut, Part
@@ -376,7 +376,7 @@ def folded(depth: float) -> Mesh:
 
 @pytest.mark.parametrize("depth", [1e-9, 1e-7, 1e-5])
 def test_a_folded_sliver_dissolves_in_the_boolean_without_harm_and_is_told(monkeypatch, depth):
-    monkeypatch.setattr(solid, "straight", lambda feature: False)
+    monkeypatch.setattr(plan, "straight", lambda feature: False)
     base = folded(depth)
     sliver = len(base.triangles) - 3
     part = make(base, laid([[12, 2, 0]], UP, 3, 1.8))
@@ -398,7 +398,7 @@ def test_drilling_leaves_a_folded_sliver_as_it_is(depth):
 def test_a_change_where_no_hole_is_is_a_problem(monkeypatch, harm):
     base = slab(12)
     whole = solid.combine
-    monkeypatch.setattr(solid, "straight", lambda feature: False)
+    monkeypatch.setattr(plan, "straight", lambda feature: False)
 
     def harmed(*given):
         left = whole(*given)
@@ -418,7 +418,7 @@ def test_a_change_where_no_hole_is_is_a_problem(monkeypatch, harm):
             triangles = np.concatenate([triangles, [[b, c, middle], [c, a, middle]]])
             triangles[one] = [a, b, middle]
             face = np.concatenate([face, [face[one]] * 2])
-        return Cut(Mesh(vertices, np.concatenate([triangles, left.walls])), face, left.facet)
+        return Cut(Mesh(vertices, np.concatenate([triangles, left.walls])), face, left.facet, left.feature)
 
     base_square = [*base.triangles[0], base.triangles[144, 2]]
     monkeypatch.setattr(solid, "combine", harmed)
@@ -547,7 +547,7 @@ def test_any_plate_however_it_lies(width, depth, thickness, share, pitch, sides,
 def test_a_base_that_is_cut_away_altogether_leaves_nothing(monkeypatch):
     base, pattern = plate(), laid([[0, 0, 0]], UP, 3, 1.8)
     whole = solid.combine
-    monkeypatch.setattr(solid, "straight", lambda feature: False)
+    monkeypatch.setattr(plan, "straight", lambda feature: False)
 
     def all_of_it(mesh, face, cutters, adds):
         lid = box((-99, -99, -99), (99, 99, 99))
