@@ -1,4 +1,4 @@
-"""Step 3: add the features to the base geometry in one boolean, then measure what came out."""
+"""Step 3: add the features to the base geometry, all at once, then measure what came out."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def part_steps(
     single feature that cannot be added (wall too thick, next wall too close) is left out and reported in the
     part.
 
-    Here the boolean is one step: no call of manifold3d 3.5.4 lets go of the interpreter while it works, so
+    Here cutting is one step: no call of manifold3d 3.5.4 lets go of the interpreter while it works, so
     that a thread beside it could neither read its progress nor cancel it. In a process of its own it can be
     given up as everything before and after can; what it has done is then told by the time it takes.
     """
