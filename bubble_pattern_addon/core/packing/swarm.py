@@ -200,16 +200,19 @@ def links_of(swarm: Swarm, active: Ints) -> Links:
     """The pairs that act on the bubbles `active` (a,)."""
     n = len(swarm.points)
     pairs = swarm.pairs
-    # Bubbles that are not active share one place after the last, which nobody reads.
-    place = np.full(n, len(active))
+    # Bubbles that are not active share one place after the last, which nobody reads. Numbers of 32 bits are
+    # what the matrix would make of longer ones.
+    place = np.full(n, len(active), dtype=np.int32)
     place[active] = np.arange(len(active))
     if len(active) < n:
         touched = (place[pairs.first] < len(active)) | (place[pairs.second] < len(active))
         pairs = Pairs(pairs.first[touched], pairs.second[touched], pairs.stable[touched])
     number = len(pairs.first)
-    rows = np.stack([place[pairs.first], place[pairs.second]], axis=1).ravel()
-    signs = np.tile([1.0, -1.0], number)
-    incidence = csc_array((signs, rows, 2 * np.arange(number + 1)), shape=(len(active) + 1, number))
+    rows, signs = np.empty((number, 2), dtype=np.int32), np.empty((number, 2))
+    rows[:, 0], rows[:, 1] = place[pairs.first], place[pairs.second]
+    signs[:] = 1.0, -1.0
+    starts = np.arange(0, 2 * number + 1, 2, dtype=np.int32)
+    incidence = csc_array((signs.ravel(), rows.ravel(), starts), shape=(len(active) + 1, number))
     return Links(active, pairs, incidence, swarm.pitch[active, None], 1 / pairs.stable)
 
 
