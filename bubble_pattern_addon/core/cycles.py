@@ -27,3 +27,27 @@ def ranges(start: Ints, number: Ints) -> Ints:
     """`number`, (n,), whole numbers from each `start`, (n,), on, end to end."""
     before = np.cumsum(number) - number
     return np.arange(number.sum()) + np.repeat(start - before, number)
+
+
+def unrolled(following: Ints, first: Ints, total: Ints) -> Ints:
+    """The same as `followed` where every row is on one of these ways: in few rounds however long they are.
+
+    Each round every row looks twice as far ahead (J. C. Wyllie's list ranking, The complexity of parallel
+    computations, 1979).
+    """
+    before = np.empty(len(following), dtype=np.int64)
+    before[following] = np.arange(len(following))
+    end = before[first]
+    ahead = following.copy()
+    ahead[end] = end
+    left = np.ones(len(following), dtype=np.int64)
+    left[end] = 0
+    for _ in range(int(total.max(initial=1)).bit_length()):
+        left += left[ahead]
+        ahead = ahead[ahead]
+    way = np.empty(len(following), dtype=np.int64)
+    way[end] = np.arange(len(first))
+    way = way[ahead]
+    rows = np.empty(len(following), dtype=np.int64)
+    rows[np.cumsum(total)[way] - 1 - left] = np.arange(len(following))
+    return rows

@@ -2,8 +2,7 @@
 
 What is left of a face is bounded by pieces of its sides, out of the columns, and by the ways of the outlines
 over it, against their direction. Each begins where another ends, so they link up to polygons; an outline that
-lies in one face all round is a hole in that face's polygon. manifold3d triangulates all polygons at once,
-laid out side by side.
+lies in one face all round is a hole in that face's polygon.
 """
 
 from __future__ import annotations
@@ -11,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import manifold3d
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
@@ -21,13 +19,7 @@ from .cycles import followed, ranges
 from .mesh import Floats, Ints, Mesh
 from .ranking import numbered, ranked
 from .tracing import Traces
-
-APART = 4.0
-"""Times a polygon's size that polygons are laid apart."""
-TOGETHER = 24
-"""Faces with holes that are triangulated together: the time grows with the square of their number."""
-COVERED = 1e-9
-"""Share of a face by which its triangles may differ from what is left of it."""
+from .triangulating import triangulated
 
 
 @dataclass(frozen=True)
@@ -90,11 +82,14 @@ def remainder(base: Mesh, columns: Columns, traces: Traces, points: Points) -> t
     if polygons is None:
         return None
     holes = _holes(columns, traces, points)
-    pieces = _triangulated(base, points, polygons, holes)
+    contours = _Polygons(*(np.concatenate(both) for both in zip(polygons, holes, strict=True)))
+    flat, cell = _flattened(base, points, contours)
+    pieces = triangulated(flat, contours.total, cell, len(polygons.total))
     if pieces is None:
         return None
+    face = np.repeat(contours.face, contours.total)[pieces[:, 0]]
     whole = np.flatnonzero(~touched)
-    return np.concatenate([base.triangles[whole], pieces[0]]), np.concatenate([whole, pieces[1]])
+    return np.concatenate([base.triangles[whole], contours.vertex[pieces]]), np.concatenate([whole, face])
 
 
 def _sides(base: Mesh, traces: Traces, points: Points, faces: Ints) -> _Runs | None:
@@ -210,36 +205,6 @@ def _holes(columns: Columns, traces: Traces, points: Points) -> _Polygons:
     return _Polygons(np.repeat(ring, size) + place, size, traces.begin[way])
 
 
-def _triangulated(base: Mesh, points: Points, outer: _Polygons, holes: _Polygons) -> tuple[Ints, Ints] | None:
-    """Triangles of the polygons with the holes cut out of them, (n, 3), and the faces they lie on, (n,); None
-    where they do not cover what is left of the faces.
-    """
-    pierced = np.zeros(len(base.triangles), dtype=bool)
-    pierced[holes.face] = True
-    pierced = pierced[outer.face]
-    all_of = _Polygons(*(np.concatenate(both) for both in zip(outer, holes, strict=True)))
-    flat, cell = _flattened(base, points, all_of)
-    wide = int(np.ceil(np.sqrt(cell.max(initial=0) + 1)))
-    laid = flat + APART * np.repeat(np.stack([cell % wide, cell // wide], axis=1), all_of.total, axis=0)
-    owner = np.repeat(np.arange(len(all_of.total)), all_of.total)
-    bounds = np.concatenate([[0], np.cumsum(all_of.total)])
-    plain = np.flatnonzero(~pierced)
-    batches = [plain] if len(plain) else []
-    rest = np.concatenate([np.flatnonzero(pierced), np.arange(len(outer.total), len(all_of.total))])
-    rest = rest[np.argsort(cell[rest], kind="stable")]
-    changes = np.flatnonzero(np.diff(cell[rest], prepend=-1))
-    batches += np.split(rest, changes[TOGETHER::TOGETHER]) if len(rest) else []
-    found = []
-    for batch in batches:
-        contours = [laid[bounds[which] : bounds[which + 1]] for which in batch]
-        triangles = np.asarray(manifold3d.triangulate(contours), dtype=np.int64).reshape(-1, 3)
-        found.append(ranges(bounds[batch], all_of.total[batch])[triangles])
-    corner = np.concatenate([*found, np.zeros((0, 3), dtype=np.int64)])
-    if not _covering(flat, corner, owner, cell, bounds):
-        return None
-    return all_of.vertex[corner], all_of.face[owner[corner[:, 0]]]
-
-
 def _flattened(base: Mesh, points: Points, polygons: _Polygons) -> tuple[Floats, Ints]:
     """The polygons' vertices in the planes of their faces, (P, 2), in units of these; and the number of the
     face of each polygon among those that have any, (p,).
@@ -255,17 +220,3 @@ def _flattened(base: Mesh, points: Points, polygons: _Polygons) -> tuple[Floats,
     offset = points.place[polygons.vertex] - origin[which]
     flat = [(offset * (way / size)[which]).sum(axis=1) for way in (x, y)]
     return np.stack(flat, axis=1), cell
-
-
-def _covering(flat: Floats, corner: Ints, owner: Ints, cell: Ints, bounds: Ints) -> bool:
-    """Do the triangles `corner`, (n, 3), lie the right way up and cover what the polygons enclose?"""
-    if not len(cell):
-        return True
-    x, y = flat.T
-    following = np.arange(1, len(x) + 1)
-    following[bounds[1:] - 1] = bounds[:-1]
-    enclosed = np.add.reduceat(x * y[following] - x[following] * y, bounds[:-1])
-    a, b, c = corner.T
-    area = (x[b] - x[a]) * (y[c] - y[a]) - (y[b] - y[a]) * (x[c] - x[a])
-    apart = np.bincount(cell[owner[a]], area, cell.max() + 1) - np.bincount(cell, enclosed)
-    return bool((area > -COVERED).all() and (np.abs(apart) <= COVERED).all())

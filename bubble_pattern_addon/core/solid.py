@@ -72,43 +72,51 @@ def cutting_seconds(plan: Plan) -> float:
 
 def cut(plan: Plan) -> Cut:
     """What `plan` leaves of its base: straight holes are drilled, see core.drilling; what can't be is left to
-    one boolean, see `combine`, and so is everything where many holes crowd one face, which is split for it.
+    one boolean, see `combine`.
     """
-    wall, base = plan.wall, plan.sound.mesh
-    through = np.flatnonzero(plan.meets & np.isfinite(wall.seen_axis))
-    feature = wall.seen_feature[through]
-    pattern = plan.pattern
-    place = pattern.position[feature] + wall.seen_axis[through, None] * pattern.normal[feature]
-    split, piece = split_crowded(base, wall.seen_triangle[through], place, _room(plan)[feature])
-    if plan.columns is None or split is not base:
-        return combine(split, piece, plan.cutters, plan.feature.adds)
-    return _drilled(plan, plan.columns)
+    if plan.columns is None:
+        return _split_and_combined(plan)
+    left, done = _drilled(plan, plan.columns)
+    if not len(done):
+        return _split_and_combined(plan)
+    if len(done) == len(plan.columns):
+        return left
+    return _rest_combined(left, len(plan.sound.mesh.triangles), plan.solids(np.delete(plan.chosen, done)))
 
 
-def _drilled(plan: Plan, columns: Columns) -> Cut:
-    """The base of `plan` less its columns, those that can't be drilled by the boolean."""
-    wall, seen, base = plan.wall, np.flatnonzero(plan.meets), plan.sound.mesh
+def _drilled(plan: Plan, columns: Columns) -> tuple[Cut, Ints]:
+    """See `drilling.drilled`."""
+    wall, seen = plan.wall, np.flatnonzero(plan.meets)
     row = np.full(len(plan.pattern), -1)
     row[columns.feature] = np.arange(len(columns))
-    spans = Spans(
-        row[wall.seen_feature[seen]], wall.seen_triangle[seen], wall.seen_low[seen], wall.seen_high[seen]
-    )
-    left, done = drilled(base, columns, spans)
-    if len(done) == len(columns):
-        return left
+    owner = row[wall.seen_feature[seen]]
+    spans = Spans(owner, wall.seen_triangle[seen], wall.seen_low[seen], wall.seen_high[seen])
+    return drilled(plan.sound.mesh, columns, spans)
+
+
+def _rest_combined(left: Cut, faces: int, rest: Cutters) -> Cut:
+    """What drilling `left` of a base with so many `faces`, less the `rest` of the features."""
     # faces of the base and walls of the drilled holes are told apart by their numbers
-    first, known = len(base.triangles), len(left.feature)
-    rest = plan.solids(np.delete(columns.feature, done))
-    last = combine(left.mesh, np.concatenate([left.face, first + left.facet]), rest)
-    drill = last.face >= first
-    base_first = np.argsort(drill, kind="stable")
-    order = np.concatenate([base_first, np.arange(len(drill), len(last.mesh.triangles))])
+    last = combine(left.mesh, np.concatenate([left.face, faces + left.facet]), rest)
+    walls = last.face >= faces
+    base_first = np.argsort(walls, kind="stable")
+    order = np.concatenate([base_first, np.arange(len(walls), len(last.mesh.triangles))])
     return Cut(
         Mesh(last.mesh.vertices, last.mesh.triangles[order]),
-        last.face[~drill],
-        np.concatenate([last.face[drill] - first, known + last.facet]),
+        last.face[~walls],
+        np.concatenate([last.face[walls] - faces, len(left.feature) + last.facet]),
         np.concatenate([left.feature, last.feature]),
     )
+
+
+def _split_and_combined(plan: Plan) -> Cut:
+    """One boolean for all features, the faces that many of them crowd split for it."""
+    wall, base, pattern = plan.wall, plan.sound.mesh, plan.pattern
+    through = np.flatnonzero(plan.meets & np.isfinite(wall.seen_axis))
+    feature = wall.seen_feature[through]
+    place = pattern.position[feature] + wall.seen_axis[through, None] * pattern.normal[feature]
+    split, piece = split_crowded(base, wall.seen_triangle[through], place, _room(plan)[feature])
+    return combine(split, piece, plan.cutters, plan.feature.adds)
 
 
 def _room(plan: Plan) -> Floats:

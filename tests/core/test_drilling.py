@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bubble_pattern_addon.core import remainders, solid, tracing
+from bubble_pattern_addon.core import solid, tracing, triangulating
 from bubble_pattern_addon.core.closed import measure
 from bubble_pattern_addon.core.drilling import Spans, drilled
 from bubble_pattern_addon.core.mesh import Floats, Ints, Mesh
@@ -220,8 +220,8 @@ def test_columns_that_overlap_are_left_to_the_boolean():
 
 def test_a_triangulation_that_does_not_cover_its_face_is_not_taken(monkeypatch):
     plan = planned(slab(12), *on_top(slab(12), spread(3, 9, 8, 4)), 2.0, Feature())
-    whole = remainders.manifold3d.triangulate
-    monkeypatch.setattr(remainders.manifold3d, "triangulate", lambda polygons: whole(polygons)[1:])
+    whole = triangulating.manifold3d.triangulate
+    monkeypatch.setattr(triangulating.manifold3d, "triangulate", lambda polygons: whole(polygons)[1:])
     assert len(drill(plan)[1]) == 0
     assert_same(solid.cut(plan), boolean(plan), plan.sound.mesh)
 
