@@ -79,15 +79,11 @@ def _heights(base: Mesh, columns: Columns, traces: Traces) -> tuple[Floats, Floa
     found = []
     for side in (0, 1):
         way = 2 * owner + side
-        face = traces.begin[way]
-        # after the last crossing before it
         mine = np.flatnonzero(traces.way % 2 == side)
+        # the last crossing before each corner; where there is none, the one that is added at the end
         before = np.searchsorted(traces.at[mine], corner) - 1
-        known = (before >= 0) & (len(mine) > 0)
-        last = mine[np.maximum(before, 0)] if len(mine) else np.zeros(len(corner), dtype=np.int64)
-        same = np.flatnonzero(known)
-        same = same[traces.way[last[same]] == way[same]]
-        face[same] = traces.into[last[same]]
+        ways, into = np.append(traces.way[mine], -1), np.append(traces.into[mine], -1)
+        face = np.where(ways[before] == way, into[before], traces.begin[way])
         on = np.flatnonzero(face >= 0)
         height = below.copy()
         height[on] = _height(base, columns, on, owner[on], face[on])

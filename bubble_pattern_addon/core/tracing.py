@@ -70,8 +70,7 @@ class _Seen:
     """What columns see of the base: k pairs of a column and a face, q of a column and a vertex, e of a column
     and an edge.
 
-    owner, triangle, facing: (k,); corner: (k, 3) rows of places, side: (k, 3) rows of edges, from each corner
-        to the next
+    owner, triangle: (k,); facing: (k,) see `_facing`; corner: (k, 3) rows of places
     vertex, place_owner: (q,), x, y: (q,) in the column's frame
     low, high: (e,) rows of places, forth, back: (e,) pairs whose faces run along the edge from low to high
         and from high to low, -1 where there is not just one
