@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 
 from .mesh import Floats, Ints
 from .region import Region
+from .vectors import dots
 
 # Nearest samples whose segments are measured exactly; two segments meet at a corner, a sheet's fold may add
 # some more.
@@ -85,7 +86,7 @@ def inside_distance(boundary: Boundary, points: Floats, row: Ints) -> Floats:
     """
     distance, foot, segment = _nearest_segment(boundary, points, row)
     inward = np.cross(boundary.region.normals[row], boundary.along[:, segment].T)
-    side = np.copysign(distance, np.einsum("nc,nc->n", points - foot, inward))
+    side = np.copysign(distance, dots(points - foot, inward))
     return side - boundary.region.reserve[segment]
 
 

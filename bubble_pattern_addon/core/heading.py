@@ -20,6 +20,7 @@ from .profile import outlines, signed_area
 from .region import Region
 from .stamp import footprint, make_stamp
 from .surroundings import NOTHING, Surroundings
+from .vectors import dots
 
 # A direction this much shorter than it was, once laid square to the axis, points nowhere.
 NOWHERE = 1e-6
@@ -245,7 +246,7 @@ def _between_turns(
     ends = np.cumsum(sizes)
     before = np.arange(len(unit)) - 1
     before[ends - sizes] = ends - 1
-    turn = start[np.einsum("sc,sc->s", unit[before], unit) < np.cos(SHARP_TURN)]
+    turn = start[dots(unit[before], unit) < np.cos(SHARP_TURN)]
     if not len(turn):
         return around
     first, beyond = np.searchsorted(turn, begin), np.searchsorted(turn, begin + around)

@@ -23,6 +23,7 @@ from .recipe import KeepOut
 from .region import Region, make_region
 from .selection import face_set
 from .surroundings import Solid, Solids
+from .vectors import dots
 
 # How fine outlines are followed, relative to their extent: chords by height, edges by length.
 CHORD, COARSEST, FINEST = 4e-4, 1 / 12, 1e-3
@@ -139,7 +140,7 @@ def _distance_to(boundary: Boundary) -> Callable[[Floats, Ints], Floats]:
     def distance(points: Floats, row: Ints) -> Floats:
         found, _ = nearest_boundary(boundary, points, row)
         _, sample = boundary.tree.query(signature(region, points, row, boundary.reach))
-        cosine = np.einsum("nc,nc->n", region.normals[row], towards[boundary.owner[sample]])
+        cosine = dots(region.normals[row], towards[boundary.owner[sample]])
         return np.where(cosine > BEHIND, found, region.extent + found)
 
     return distance

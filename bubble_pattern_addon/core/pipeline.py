@@ -23,6 +23,7 @@ from .region import Region
 from .shaping import bound, shaped
 from .surface import Charts, Spots, on_base, smooth_normals, to_frame, to_space
 from .surroundings import NOTHING, Surroundings
+from .vectors import dots
 
 
 def pattern_steps(region: Region, recipe: Recipe, surroundings: Surroundings = NOTHING) -> Steps[Pattern]:
@@ -138,5 +139,5 @@ def _tangents(charts: Charts, spots: Spots, points: Floats, links: Links, normal
     angle = np.where(np.abs(six) > 1e-9, np.angle(six), 0.0) / 6
     turns = np.round((np.angle(reference) - angle) / (np.pi / 3))
     tangent = to_space(charts, spots.row, np.exp(1j * (angle + turns * np.pi / 3)))
-    tangent -= np.einsum("nc,nc->n", tangent, normal)[:, None] * normal
+    tangent -= dots(tangent, normal)[:, None] * normal
     return tangent / np.linalg.norm(tangent, axis=1, keepdims=True)

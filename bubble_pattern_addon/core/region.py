@@ -13,6 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from .boxtree import BoxTree, build_tree
 from .errors import RegionError
 from .mesh import Bools, Floats, Ints, Mesh
+from .vectors import dots
 
 if TYPE_CHECKING:
     from .surface import Charts
@@ -108,14 +109,14 @@ class Region:
         """
         if self.single_sheet:
             return np.ones(len(row), dtype=bool)
-        cosine = np.einsum("mc,mc->m", self.normals[row], self.normals[other])
+        cosine = dots(self.normals[row], self.normals[other])
         return (cosine > BACK_TO_BACK) & (self.sheet[row] == self.sheet[other])
 
     @cached_property
     def flat(self) -> bool:
         """Whether all triangles face the same way: each part of the region lies in a plane."""
         away = self.normals - self.normals[0]
-        return bool(np.einsum("rc,rc->r", away, away).max() < LEVEL**2)
+        return bool(dots(away, away).max() < LEVEL**2)
 
     @cached_property
     def boundary_segments(self) -> Floats:
@@ -211,7 +212,7 @@ def _check_geometry(base: Mesh, triangles: Ints) -> None:
     edges = corners - corners[:, [2, 0, 1]]
     longest = np.einsum("tkc,tkc->tk", edges, edges).max(axis=1)
     across = np.cross(edges[:, 0], edges[:, 1])
-    flat = np.einsum("tc,tc->t", across, across) <= (FLAT * longest) ** 2
+    flat = dots(across, across) <= (FLAT * longest) ** 2
     if flat.any():
         at = corners[flat][0].mean(axis=0)
         raise RegionError(

@@ -17,6 +17,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spannin
 
 from .mesh import Bools, Floats, Ints
 from .region import Region
+from .vectors import dots
 
 # A loop whose turning is farther from an island's than this is an end of a tube.
 TUBE_END = np.pi / 2
@@ -118,7 +119,7 @@ def find_cuts(region: Region, all_the_way: bool = False) -> Bools:
 def _along_creases(region: Region, edges: Edges) -> Edges:
     """The edges with those shorter along which the region bends."""
     beside = region.neighbours[edges.row, edges.corner]
-    cosine = np.einsum("ec,ec->e", region.normals[edges.row], region.normals[beside])
+    cosine = dots(region.normals[edges.row], region.normals[beside])
     creased = ~edges.rim & (cosine < np.cos(CREASE))
     return replace(edges, length=np.where(creased, CREASED * edges.length, edges.length))
 

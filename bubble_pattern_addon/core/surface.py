@@ -19,6 +19,7 @@ from scipy.spatial import cKDTree
 from .mesh import Bools, Floats, Ints
 from .metric import Places
 from .region import Region
+from .vectors import dots
 
 Complex = NDArray[np.complex128]
 
@@ -81,7 +82,8 @@ class Charts:
         # Along the line from the middle of the shortest side to the corner opposite to it.
         bary = np.repeat((1 - share)[:, None] / 2, 3, axis=1)
         bary[np.arange(len(owner)), sides.argmin(axis=1)[owner]] = share
-        return cKDTree(_posted(self, in_plane(self, positions(self, Spots(owner, bary))), owner)), owner
+        posts = _posted(self, in_plane(self, positions(self, Spots(owner, bary))), owner)
+        return cKDTree(posts, balanced_tree=False, compact_nodes=False), owner
 
 
 class Plane(NamedTuple):
@@ -378,7 +380,7 @@ def _corner_normals(region: Region, rows: Ints) -> Floats:
     turn = np.arange(len(own)) - np.repeat(np.cumsum(number) - number, number)
     other = order[start[vertices[asked[own]]] + turn] // 3
     normals = region.normals
-    smooth = np.einsum("mc,mc->m", normals[asked[own] // 3], normals[other]) > np.cos(CREASE)
+    smooth = dots(normals[asked[own] // 3], normals[other]) > np.cos(CREASE)
     own, weighted = own[smooth], region.area_vectors[other[smooth]]
     total = np.stack([np.bincount(own, axis, len(asked)) for axis in weighted.T], axis=1)
     return (total / np.linalg.norm(total, axis=1, keepdims=True)).reshape(-1, 3, 3)

@@ -13,6 +13,7 @@ from .isometries import AUTO, OFF, Isometries, image_of, isometries, words_of
 from .mesh import Floats, Ints
 from .region import Region
 from .surface import Charts, Spots, positions, to_frame, walk
+from .vectors import dots
 
 Lengths = Callable[[Spots], Floats]
 
@@ -219,7 +220,7 @@ def _off(
         # A walk that the boundary stops need not end at the nearest place; for what is outside that is on it.
         off = np.minimum(off, nearest_boundary(boundary, image, place.row)[0])
     facing = region.normals[spots.row] @ group.turns[number].T
-    facing = np.einsum("nc,nc->n", facing, region.normals[place.row])
+    facing = dots(facing, region.normals[place.row])
     worst = float(np.where(facing > SAME_FACING, off, region.extent).max())
     if boundary is None:
         return worst

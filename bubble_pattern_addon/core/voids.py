@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 from .distance import index_segments, nearest_piece
 from .mesh import Bools, Floats, Ints
 from .neighbours import SHEET_TURN, Neighbours, tangent_axes
+from .vectors import dots
 
 # Smaller circles, in pitches, are no voids: three neighbours of a square are 0.71 from its middle.
 LEAST = 0.72
@@ -111,4 +112,4 @@ def _inside(places: Floats, normal: Floats, segments: Floats, clear: Floats) -> 
     start, end = index.pieces[piece].swapaxes(0, 1)
     inward = np.cross(normal, end - start)
     # Of two that meet at a corner either tells the side, as places nearest to the corner see both from one.
-    return (np.einsum("mc,mc->m", places - start, inward) > 0) & (distance >= clear)
+    return (dots(places - start, inward) > 0) & (distance >= clear)

@@ -9,6 +9,7 @@ from .mesh import Bools, Floats, Ints
 from .neighbours import SHEET_TURN, same_sheet
 from .pattern import Pattern
 from .region import Region
+from .vectors import dots
 
 # Features that touched would make a part that is no solid: this share of the pitch remains between two of
 # them, and half as much to the boundary, where the limits ask for less.
@@ -62,6 +63,6 @@ def _feel_each_other(normal: Floats, pairs: Ints, offset: Floats, distance: Floa
     edge.
     """
     one, other = normal[pairs[:, 0]], normal[pairs[:, 1]]
-    cosine = np.einsum("mc,mc->m", one, other)
+    cosine = dots(one, other)
     level = same_sheet(offset[:, None], one[:, None], other[:, None], distance[:, None])[:, 0]
     return np.where(cosine > LEVEL, level, cosine > SHEET_TURN)

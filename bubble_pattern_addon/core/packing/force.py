@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 
 from ..mesh import Floats, Ints
 from ..surface import Charts
+from ..vectors import dots
 
 # Bubbles farther apart than this many stable distances do not feel each other.
 REACH = 1.5
@@ -87,7 +88,7 @@ def within_reach(pairs: Pairs, points: Floats, skin: float) -> Pairs:
     """Those of the pairs that are closer now than 1.5 stable distances plus `skin` pitches."""
     away = points.take(pairs.first, axis=0)
     away -= points.take(pairs.second, axis=0)
-    close = np.einsum("mc,mc->m", away, away) < ((REACH + skin) * pairs.stable) ** 2
+    close = dots(away, away) < ((REACH + skin) * pairs.stable) ** 2
     return Pairs(pairs.first[close], pairs.second[close], pairs.stable[close])
 
 

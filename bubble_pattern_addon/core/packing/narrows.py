@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 from ..boundary import nearest_boundary, signature
 from ..mesh import Bools, Floats, Ints
 from ..surface import Spots, positions, to_frame, walk
+from ..vectors import dots
 from .bubbles import Ground, joined
 from .crowding import close_pairs, uncrowded
 from .rim import CLOSEST, FirstRow, on_track
@@ -168,7 +169,7 @@ def _to_the_middle(ground: Ground, row: FirstRow, spots: Spots) -> Floats:
     pick = np.arange(len(points))
     other = near[pick, first]
     across = track.points[other] - points
-    across -= np.einsum("nc,nc->n", across, along[other])[:, None] * along[other]
+    across -= dots(across, along[other])[:, None] * along[other]
     way = np.where(found[pick, first][:, None], across / 2, np.nan)
     return _alone(ground, knot, points, way)
 

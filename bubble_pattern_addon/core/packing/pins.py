@@ -12,6 +12,7 @@ from ..errors import RegionError
 from ..mesh import Bools, Floats, Ints
 from ..snapping import snapped
 from ..surface import Charts, Spots, positions
+from ..vectors import dots
 from .bubbles import Ground, joined
 from .crowding import close_pairs
 from .rim import Lengths, Track, spots_on_track
@@ -99,7 +100,7 @@ def _nearest_on(track: Track, points: Floats, local: Floats) -> tuple[Ints, Floa
     """
     start, end = track.points[:-1], track.points[1:]
     along = end - start
-    square = np.maximum(np.einsum("kc,kc->k", along, along), 1e-300)
+    square = np.maximum(dots(along, along), 1e-300)
     offset = points[:, None] - start
     share = np.clip(np.einsum("nkc,kc->nk", offset, along) / square, 0, 1)
     away = np.linalg.norm(offset - share[..., None] * along, axis=2)

@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 from ..boundary import nearest_boundary, signature
 from ..mesh import Bools, Floats, Ints
 from ..surface import Charts, Spots, positions, to_frame, walk
+from ..vectors import dots
 from .bubbles import Bubbles, Ground, joined
 from .crowding import close_pairs, uncrowded
 from .domain import led_here
@@ -266,7 +267,7 @@ def _taken(points: Floats, pairs: Pairs, triple: Ints, centre: Floats, radius: F
     neighbour = link.indices[np.arange(degree.sum()) + np.repeat(begins, degree)]
     circle = np.repeat(np.arange(len(asked)) // 3, degree)
     away = points[neighbour] - centre[circle]
-    within = np.einsum("mc,mc->m", away, away) < radius[circle] ** 2
+    within = dots(away, away) < radius[circle] ** 2
     return np.bincount(circle[within], minlength=len(triple)) > 0
 
 
@@ -300,8 +301,8 @@ def _circumcircles(corners: Floats) -> tuple[Floats, Floats]:
     """Centres (m, 3) and radii (m,) of the circles through three points, (m, 3, 3)."""
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     normal = np.cross(a, b)
-    square = np.maximum(np.einsum("mc,mc->m", normal, normal), 1e-300)
-    aa, bb = np.einsum("mc,mc->m", a, a), np.einsum("mc,mc->m", b, b)
+    square = np.maximum(dots(normal, normal), 1e-300)
+    aa, bb = dots(a, a), dots(b, b)
     offset = np.cross(aa[:, None] * b - bb[:, None] * a, normal) / (2 * square[:, None])
     return corners[:, 0] + offset, np.linalg.norm(offset, axis=1)
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..mesh import Bools, Floats
 from ..progress import Progress, Steps, drive
+from ..vectors import dots
 from .bubbles import Bubbles, Ground
 from .force import Law, force_law
 from .swarm import (
@@ -112,7 +113,7 @@ def relax_steps(
     while done < iterations:
         pull = pull_on(swarm, links, law)
         stirred = np.zeros(len(everyone), dtype=bool)
-        stirred[links.active] = np.einsum("nc,nc->n", pull, pull) > quiet**2
+        stirred[links.active] = dots(pull, pull) > quiet**2
         if not stirred.any():
             if looked_at_all:
                 break
@@ -178,7 +179,7 @@ def _block(swarm: Swarm, fire: Fire, links: Links, law: Law, steps: int) -> Link
             velocity = fire.pace * pull
             fire.pace, fire.mixing, fire.downhill = 0.5 * fire.pace, 0.1, 0
         step = fire.pace * velocity
-        longest = float(np.sqrt(np.einsum("nc,nc->n", step, step).max(initial=0.0)))
+        longest = float(np.sqrt(dots(step, step).max(initial=0.0)))
         if longest > LONGEST_STEP:
             step *= LONGEST_STEP / longest
             longest = LONGEST_STEP

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..mesh import Bools, Floats, Ints
 from ..surface import Charts, Spots, positions, to_frame, walk
+from ..vectors import dots
 
 # A turn of the inset line by more than this within 0.7 pitch is a sharp corner and gets a bubble of its own.
 SHARP = np.radians(40.0)
@@ -105,7 +106,7 @@ def _sharp_knots(points: Floats, arc: Floats, chain: Ints, closed: Bools) -> Boo
         np.stack([np.interp(at, arc, axis) for axis in points.T], axis=1) for at in (ahead, back)
     )
     forward, backward = forward - points, points - backward
-    cosine = np.einsum("nc,nc->n", forward, backward)
+    cosine = dots(forward, backward)
     cosine /= np.maximum(np.linalg.norm(forward, axis=1) * np.linalg.norm(backward, axis=1), 1e-300)
     turn = np.where(high - low > 4 * CORNER_SCALE, np.arccos(np.clip(cosine, -1, 1)), 0.0)
     is_end = np.zeros(len(arc), dtype=bool)
@@ -220,7 +221,7 @@ def straight_stretches(charts: Charts, track: Track) -> tuple[Floats, Floats, In
     along = np.diff(track.points, axis=0)
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
     normals = charts.region.normals[track.spots.row]
-    turning = np.einsum("kc,kc->k", np.cross(along[:-1], along[1:]), normals[1:-1])
+    turning = dots(np.cross(along[:-1], along[1:]), normals[1:-1])
     turned = np.concatenate([[0.0], np.cumsum(np.abs(turning)), [0.0]])
     turned[-1] = turned[-2]
     # From one line to the next nothing is straight.

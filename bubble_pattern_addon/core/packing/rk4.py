@@ -8,6 +8,7 @@ import numpy as np
 
 from ..mesh import Floats
 from ..progress import Progress, Steps, drive
+from ..vectors import dots
 from .bubbles import Bubbles, Ground
 from .force import Law, force_law
 from .relax import BLOCK, LONGEST_STEP, USUAL
@@ -56,7 +57,7 @@ def integration_steps(
         step = np.zeros_like(velocity)
         for weight, (moving, _) in zip(weights, slopes, strict=True):
             step += STEP * weight * moving
-        longest = float(np.sqrt(np.einsum("nc,nc->n", step, step).max(initial=0.0)))
+        longest = float(np.sqrt(dots(step, step).max(initial=0.0)))
         if longest > LONGEST_STEP:
             step *= LONGEST_STEP / longest
         velocity = velocity + STEP * sum(

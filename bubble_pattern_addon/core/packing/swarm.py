@@ -15,6 +15,7 @@ from ..isometries import image_of
 from ..mesh import Bools, Floats, Ints
 from ..progress import Snapshot
 from ..surface import Spots, positions, to_frame, walk
+from ..vectors import dots
 from .bubbles import Bubbles, Ground, can_move
 from .force import NO_PAIRS, Law, Pairs, find_pairs, renewed_pairs, within_reach
 from .orbits import HALO, Followers, followers_of, held
@@ -142,7 +143,7 @@ def _renew_wide(swarm: Swarm) -> None:
     pairs, listed_at = swarm.wide
     charts, points, pitch = swarm.ground.charts, swarm.points, swarm.pitch
     away = points - listed_at
-    shift = np.einsum("nc,nc->n", away, away) / pitch**2
+    shift = dots(away, away) / pitch**2
     if shift.max(initial=0.0) <= WIDE_MOVED**2:
         return
     stale = np.flatnonzero(shift > (WIDE_MOVED / 2) ** 2)
@@ -186,10 +187,12 @@ class Links:
     """The pairs that act on the bubbles `active` (a,), and the (a + 1, p) matrix that adds up their forces;
     its last row takes those on all others.
 
+    rows: the active bubbles as an index, a slice where none is missing among them, which is quicker;
     pitch: (a, 1); softness: (p,) one over the stable distance
     """
 
     active: Ints
+    rows: Ints | slice
     pairs: Pairs
     incidence: csc_array
     pitch: Floats
@@ -213,7 +216,14 @@ def links_of(swarm: Swarm, active: Ints) -> Links:
     signs[:] = 1.0, -1.0
     starts = np.arange(0, 2 * number + 1, 2, dtype=np.int32)
     incidence = csc_array((signs.ravel(), rows.ravel(), starts), shape=(len(active) + 1, number))
-    return Links(active, pairs, incidence, swarm.pitch[active, None], 1 / pairs.stable)
+    return Links(active, _as_slice(active), pairs, incidence, swarm.pitch[active, None], 1 / pairs.stable)
+
+
+def _as_slice(ascending: Ints) -> Ints | slice:
+    """The same rows as a slice, if none is missing between the first and the last."""
+    if len(ascending) and ascending[-1] - ascending[0] + 1 == len(ascending):
+        return slice(int(ascending[0]), int(ascending[-1]) + 1)
+    return ascending
 
 
 def pull_on(swarm: Swarm, links: Links, law: Law) -> Floats:
@@ -228,7 +238,7 @@ def pull_on(swarm: Swarm, links: Links, law: Law) -> Floats:
     swarm.work.pairs += len(pairs.first)
     away = swarm.points.take(pairs.first, axis=0)
     away -= swarm.points.take(pairs.second, axis=0)
-    distance = np.sqrt(np.einsum("mc,mc->m", away, away))
+    distance = np.sqrt(dots(away, away))
     away *= (law(distance * links.softness) * links.softness / np.maximum(distance, 1e-300))[:, None]
     pull = (links.incidence @ away)[:-1]
     pull *= links.pitch
@@ -240,7 +250,7 @@ def along_surface(swarm: Swarm, active: Ints, vectors: Floats) -> None:
     """Take from the `vectors` (a, 3) of the active bubbles what is square to the surface where they stand."""
     if not swarm.ground.charts.region.flat:
         normal = swarm.normal[active]
-        vectors -= np.einsum("nc,nc->n", vectors, normal)[:, None] * normal
+        vectors -= dots(vectors, normal)[:, None] * normal
 
 
 def move(swarm: Swarm, links: Links, steps: Floats, longest: float) -> None:
@@ -249,7 +259,7 @@ def move(swarm: Swarm, links: Links, steps: Floats, longest: float) -> None:
         _land_the_far(swarm, links)
     swarm.drift += longest
     swarm.strayed += longest
-    swarm.points[links.active] += steps * links.pitch
+    swarm.points[links.rows] += steps * links.pitch
     follow(swarm)
 
 
@@ -259,7 +269,7 @@ def _land_the_far(swarm: Swarm, links: Links) -> None:
     """
     away = swarm.points[links.active] - swarm.landed[links.active]
     away /= links.pitch
-    square = np.einsum("ac,ac->a", away, away)
+    square = dots(away, away)
     far = square > (swarm.afloat / 2) ** 2
     drift = float(np.sqrt(square[~far].max(initial=0.0)))
     off = land(swarm, links.active[far]) / links.pitch[far, 0]
@@ -299,7 +309,7 @@ def list_anew(swarm: Swarm, active: Ints, beyond: float) -> bool:
     if swarm.strayed < beyond:
         return False
     away = swarm.points[active] - swarm.listed_at[active]
-    shift = np.einsum("ac,ac->a", away, away) / swarm.pitch[active] ** 2
+    shift = dots(away, away) / swarm.pitch[active] ** 2
     swarm.strayed = float(np.sqrt(shift.max(initial=0.0)))
     if swarm.strayed < beyond:
         return False

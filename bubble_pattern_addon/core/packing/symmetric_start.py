@@ -9,6 +9,7 @@ from ..isometries import depth, images
 from ..mesh import Bools, Floats, Ints
 from ..surface import Complex, Spots, positions, to_frame, to_space
 from ..symmetry import Symmetry, places_near
+from ..vectors import dots
 from .bubbles import Ground
 from .rim import Starts, on_track
 
@@ -94,8 +95,8 @@ def _nearest_on(ground: Ground, line: int, point: Floats) -> float:
     track = ground.track
     knots = np.flatnonzero(track.chain == line)
     start, along = track.points[knots[:-1]], np.diff(track.points[knots], axis=0)
-    square = np.maximum(np.einsum("kc,kc->k", along, along), 1e-300)
-    share = np.clip(np.einsum("kc,kc->k", point - start, along) / square, 0, 1)
+    square = np.maximum(dots(along, along), 1e-300)
+    share = np.clip(dots(point - start, along) / square, 0, 1)
     best = int(np.linalg.norm(start + share[:, None] * along - point, axis=1).argmin())
     low, high = track.arc[knots[best : best + 2]]
     return float(low + share[best] * (high - low))
