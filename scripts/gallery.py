@@ -1,4 +1,4 @@
-"""The results of the method's paper, rebuilt on bases of our own.
+"""The results of the method's paper, rebuilt on bases of our own, and the kinds of features on six products.
 
     python3 scripts/gallery.py [--out DIR] [--only NAME] [--quick]
 
@@ -9,7 +9,8 @@ Makes its own environment on first use. Every result gets a folder in DIR (defau
     pattern.blend   opens with the pattern editable
     part.stl, features.csv, report.json, part.png
 
-Beside the folders stand small pictures, NAME.jpg, and all of them on one sheet, contact_sheet.jpg.
+Beside the folders stand small pictures, NAME.jpg, and sheets of them: contact_sheet.jpg has the paper's
+results, features.jpg the kinds of features.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     from bubble_pattern_addon.core.progress import Progress
 
 RECIPES = ROOT / "scripts" / "gallery"
-NAMES = (
+RESULTS = (
     "speaker-uniform",
     "speaker-round-centre",
     "speaker-graded",
@@ -42,10 +43,13 @@ NAMES = (
     "desk-phone",
     "printer-panel",
 )
+FEATURES = ("countersunk", "slots", "drops", "dimples", "bosses", "grip")
+NAMES = RESULTS + FEATURES
+SHEETS = {"contact_sheet": RESULTS, "features": FEATURES}
 SIZE, QUICK_SIZE = (900, 675), (320, 240)
 SMALL = (640, 480)
 TILE, COLUMNS = (420, 315), 3
-"""Sizes of the small pictures and of those on the contact sheet."""
+"""Sizes of the small pictures and of those on a sheet."""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -153,9 +157,10 @@ def write_base_of(name: str, path: Path) -> None:
     import numpy as np
 
     from scripts.base_file import write_base
+    from scripts.feature_bases import FEATURE_BASES
     from scripts.gallery_bases import BASES, FINISHES
 
-    base = BASES[name]()
+    base = {**BASES, **FEATURE_BASES}[name]()
     masks = {base.body: np.ones(len(base.region), dtype=bool), **base.finishes}
     finishes = {finish: (FINISHES[finish], mask) for finish, mask in masks.items()}
     write_base(path, name, base.mesh, {"bubble_region": base.region, **base.sub_regions}, finishes)
@@ -178,17 +183,25 @@ def taking_pictures(size: tuple[int, int]) -> BlenderSide:
 
 
 def write_small_pictures(out: Path, names: Sequence[str]) -> None:
-    """NAME.jpg beside each result's folder, and of all results that are there contact_sheet.jpg."""
-    import numpy as np
-
+    """NAME.jpg beside each result's folder, and of all results that are there the sheets."""
     for name in names:
         write_jpeg(out / f"{name}.jpg", read_picture(out / name / "part.png", SMALL), quality=82)
-    there = [name for name in NAMES if (out / name / "part.png").exists()]
-    tiles = [read_picture(out / name / "part.png", TILE) for name in there]
+    for sheet, members in SHEETS.items():
+        pictures = [out / name / "part.png" for name in members]
+        pictures = [picture for picture in pictures if picture.exists()]
+        if pictures:
+            write_sheet(out / f"{sheet}.jpg", pictures)
+
+
+def write_sheet(path: Path, pictures: Sequence[Path]) -> None:
+    """Several pictures in one, row after row."""
+    import numpy as np
+
+    tiles = [read_picture(picture, TILE) for picture in pictures]
     tiles += [np.zeros_like(tiles[0])] * (-len(tiles) % COLUMNS)
     # Blender's pictures have their first row at the bottom
     rows = [np.concatenate(tiles[at : at + COLUMNS], axis=1) for at in range(0, len(tiles), COLUMNS)]
-    write_jpeg(out / "contact_sheet.jpg", np.concatenate(rows[::-1]), quality=82)
+    write_jpeg(path, np.concatenate(rows[::-1]), quality=82)
 
 
 def read_picture(path: Path, size: tuple[int, int]) -> Floats:

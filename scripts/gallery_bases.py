@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from bubble_pattern_addon.core.mesh import Bools, Floats, Mesh
-from scripts.moulding import Contour, Cover, Edge, beyond, mould, outward, resampled, smooth
+from scripts.moulding import Contour, Cover, Edge, beyond, grown, mould, smooth
 from scripts.shapes import circle, closed_sheet, flipped, grid_sheet, joined, rounded
 
 BEAD = (-1.2, 1.2, 2.2, 3.2, 4.2, 5.4, 6.6, 8, 10, 12, 14, 16)
@@ -58,11 +58,6 @@ def _button(points: Floats, line: Floats, height: float) -> Floats:
     return height * smooth(inward / 2.8)
 
 
-def _grown(line: Floats, distance: float) -> Floats:
-    even = resampled(line)
-    return even + distance * outward(even)
-
-
 def _flat(points: Floats) -> Floats:
     return np.zeros(len(points))
 
@@ -86,7 +81,7 @@ def _speaker(
         x, y = flat.T
         return -(x**2) / 900 - y**2 / 620 + _bead(beyond(flat, region)) + rise(flat)
 
-    return mould(_grown(region, 17), [Contour(region, BEAD), *contours], form, detail, edge=Edge(7, -30))
+    return mould(grown(region, 17), [Contour(region, BEAD), *contours], form, detail, edge=Edge(7, -30))
 
 
 def sedan_speaker() -> GalleryBase:

@@ -161,6 +161,12 @@ def outward(line: Floats) -> Floats:
     return normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
 
+def grown(line: Floats, distance: float) -> Floats:
+    """A closed line (k, 2), resampled, `distance` outside this one."""
+    even = resampled(line)
+    return even + distance * outward(even)
+
+
 def beyond(points: Floats, line: Floats) -> Floats:
     """Distance (n,) of points (n, 2) from a closed line (k, 2), below 0 inside."""
     start, way = line, np.roll(line, -1, axis=0) - line
