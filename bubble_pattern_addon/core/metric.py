@@ -101,7 +101,7 @@ class Constant(Described):
 
     def __call__(self, places: Places) -> Floats:
         """The value, (n,)."""
-        return np.full(len(places), self.value)
+        return np.full(len(places), self.value, dtype=np.float64)
 
 
 @dataclass(frozen=True)

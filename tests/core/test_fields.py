@@ -316,6 +316,7 @@ def test_a_constant_is_bound_to_itself() -> None:
     three = Constant(3.0)
     assert three.bind(NOTHING) is three
     assert (values(three) == 3).all()
+    assert values(Constant(3)).dtype == np.float64
 
 
 # -- what is not there ---------------------------------------------------------------------------------------

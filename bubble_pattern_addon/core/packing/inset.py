@@ -2,58 +2,136 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+from typing import NamedTuple
+
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ..boundary import Boundary, nearest_boundary
 from ..mesh import Bools, Floats, Ints
+from ..region import Region
 from ..surface import Charts, Spots, positions, to_frame, walk
+from ..vectors import dots
+from .bubbles import joined
 from .rim import Lengths, Track, track_of
 
 # Samples of the inset line per bubble radius.
 FINENESS = 5
+# Of its multiples, taken modulo 1, any few that follow one another lie evenly.
+GOLDEN = (np.sqrt(5) - 1) / 2
+# Starts of runs looked at for the one that goes on from the end of another.
+NEAR = 6
+# A corner this near the inset line, as a share of the radius, is on it.
+NEARLY = 1e-2
+
+Chain = tuple[list[Ints], bool]
+"""Runs of samples, rows of them, that follow one another; and whether the first follows the last."""
 
 
 def inset_track(charts: Charts, boundary: Boundary, pitch: Lengths, edge_offset: float) -> Track:
     """Lines where the distance to the boundary is the local bubble's radius, half a `pitch`, plus
     `edge_offset`.
 
-    Every boundary edge is sampled, each sample walks inward by the radius, and those that came nearer to
-    another part of the boundary are dropped: what remains is the line, in runs that are joined at the inner
-    corners.
+    Every boundary edge is sampled, and every vertex at which the boundary turns away from the region; each
+    sample walks inward by the radius, and those that came nearer to another part of the boundary are dropped:
+    what remains is the line, in runs that are joined at the inner corners. Round a jagged boundary, as that
+    of faces chosen from a grid, hardly more is left than short runs about its teeth.
     """
 
     def radius(at: Spots) -> Floats:
         return pitch(at) / 2 + edge_offset
 
-    spots, loop, position, sizes = _walked_inward(charts, boundary, radius)
-    chains = _joined(positions(charts, spots), loop, position, sizes, radius(spots))
-    parts = [_knots(charts, boundary, radius, spots, chain, closed) for chain, closed in chains]
-    parts = [part for part in parts if len(part[0].row) > 1]
+    walked = _walked_inward(charts, boundary, radius)
+    spots = walked.spots
+    chains = _joined(positions(charts, spots), walked, radius(spots))
+    spots, lines = _with_corners(charts, boundary, radius, spots, chains)
+    lines = [line for line in lines if len(line[0]) > 1]
+    parts = [(_filled(charts, boundary, radius, spots.take(knots)), closed) for knots, closed in lines]
     return track_of(charts, parts, pitch)
 
 
-def _walked_inward(charts: Charts, boundary: Boundary, radius: Lengths) -> tuple[Spots, Ints, Ints, Ints]:
-    """Samples of the inset line: spots (m,), loop (m,), number among all samples (m,); and samples per loop
-    (L,).
+class Walked(NamedTuple):
+    """Samples of the inset line. spots (m,); tangent (m, 3): the line's direction there, not of unit length;
+    loop (m,); position (m,): numbers among all samples; sizes (L,): samples per loop.
     """
+
+    spots: Spots
+    tangent: Floats
+    loop: Ints
+    position: Ints
+    sizes: Ints
+
+
+def _walked_inward(charts: Charts, boundary: Boundary, radius: Lengths) -> Walked:
     region = charts.region
     row, corner = region.rim.T
-    number = _samples_per_edge(charts, radius)
-    owner = np.repeat(np.arange(len(row)), number)
-    share = (np.arange(len(owner)) - np.repeat(np.cumsum(number) - number, number) + 0.5) / number[owner]
+    owner, share, turned = _samples(charts, radius)
     at, opposite = row[owner], corner[owner]
     start = _on_edges(at, opposite, share)
     inward = 1j * (charts.corners[at, (opposite + 2) % 3] - charts.corners[at, (opposite + 1) % 3])
+    inward *= np.exp(1j * turned) / np.abs(inward)
     size = radius(start)
-    walked = walk(charts, start, inward / np.abs(inward) * (size + region.reserve[owner]))
-    known = _to_boundary(charts, boundary, walked.arrived)
-    kept = (walked.left == 0) & (known[0] >= size * (1 - 1e-3))
+    walked = walk(charts, start, inward * (size + region.reserve[owner]))
+    distance, foot = _to_boundary(charts, boundary, walked.arrived)
+    kept = (walked.left == 0) & (distance >= size * (1 - 1e-3))
     edges = [len(loop) for loop in region.loops]
     loop = np.repeat(np.arange(len(edges)), edges)[owner]
-    known = known[0][kept], known[1][kept]
-    settled = _settled(charts, boundary, radius, walked.arrived.take(kept), known)
-    return settled, loop[kept], np.flatnonzero(kept), np.bincount(loop, minlength=len(edges))
+    arrived, known = walked.arrived.take(kept), (distance[kept], foot[kept])
+    # the region is on the left of its boundary
+    tangent = np.cross(positions(charts, arrived) - known[1], region.normals[arrived.row])
+    return Walked(
+        _settled(charts, boundary, radius, arrived, known),
+        tangent,
+        loop[kept],
+        np.flatnonzero(kept),
+        np.bincount(loop, minlength=len(edges)),
+    )
+
+
+def _samples(charts: Charts, radius: Lengths) -> tuple[Ints, Floats, Floats]:
+    """Where samples start and whereto: the boundary edge (n,) each belongs to, the share of the way along it
+    (n,), and the angle from the edge's inward normal at which they walk (n,), in the order of the boundary.
+
+    At a vertex that turns away from the region the samples fan out, half of them from the end of one edge and
+    half from the start of the next. Each fan begins at another share of its first step: among teeth that are
+    all alike none of whose samples is kept, all would be missed.
+    """
+    along = _samples_per_edge(charts, radius)
+    away = np.maximum(-_turns(charts.region), 0.0)
+    leaving = np.floor(FINENESS * away / 2).astype(np.int64)
+    following = _next_edges(charts.region)
+    arriving = leaving[following]
+    number = leaving + along + arriving
+    owner = np.repeat(np.arange(len(number)), number)
+    place = np.arange(len(owner)) - np.repeat(np.cumsum(number) - number, number)
+    before, after = leaving[owner] - place, place - (leaving + along)[owner]
+    share = np.clip((0.5 - before) / along[owner], 0, 1)
+    step, phase = away / 2 / np.maximum(leaving, 1), np.arange(len(number)) * GOLDEN % 1
+    turned = np.where(before > 0, (before - phase[owner]) * step[owner], 0.0)
+    turned = np.where(after >= 0, -(after + phase[following[owner]]) * step[following[owner]], turned)
+    return owner, share, turned
+
+
+def _next_edges(region: Region) -> Ints:
+    """The boundary edge (S,) that follows each one on its loop."""
+    last = np.cumsum([len(loop) for loop in region.loops])
+    following = np.arange(1, last[-1] + 1)
+    following[last - 1] = np.append(0, last[:-1])
+    return following
+
+
+def _turns(region: Region) -> Floats:
+    """The angle (S,) by which the boundary turns towards the region where each of its edges starts."""
+    ahead = region.boundary_segments[:, 1] - region.boundary_segments[:, 0]
+    turn = np.empty(len(ahead))
+    following = _next_edges(region)
+    across = np.cross(ahead, ahead[following])
+    up = region.normals[region.rim[:, 0]] + region.normals[region.rim[following, 0]]
+    turn[following] = np.arctan2(
+        np.copysign(np.sqrt(dots(across, across)), dots(across, up)), dots(ahead, ahead[following])
+    )
+    return turn
 
 
 def _samples_per_edge(charts: Charts, radius: Lengths) -> Ints:
@@ -101,23 +179,18 @@ def _settled(
     return spots
 
 
-def _joined(
-    points: Floats, loop: Ints, position: Ints, sizes: Ints, radius: Floats
-) -> list[tuple[list[Ints], bool]]:
+def _joined(points: Floats, walked: Walked, radius: Floats) -> list[Chain]:
     """Runs of neighbouring samples, chained where one ends near the start of another; and whether the chain
     closes.
     """
-    runs, whole = _runs(loop, position, sizes)
-    chains: list[tuple[list[Ints], bool]] = [
-        ([run], True) for run, alone in zip(runs, whole, strict=True) if alone
-    ]
+    runs, whole = _runs(walked.loop, walked.position, walked.sizes)
+    chains: list[Chain] = [([run], True) for run, alone in zip(runs, whole, strict=True) if alone]
     pieces = [run for run, alone in zip(runs, whole, strict=True) if not alone]
     if not pieces:
         return chains
     starts = np.array([run[0] for run in pieces])
     ends = np.array([run[-1] for run in pieces])
-    gap, following = cKDTree(points[starts]).query(points[ends])
-    follows = np.where(gap < 0.8 * radius[ends], following, -1)
+    follows, gap = _nearest_ahead(points, walked.tangent, starts, ends, 0.8 * radius[ends])
     follows[~_first_claim(follows, gap)] = -1
     led = np.zeros(len(pieces), dtype=bool)
     led[follows[follows >= 0]] = True
@@ -132,6 +205,27 @@ def _joined(
         if chain:
             chains.append((chain, bool(at == first)))
     return chains
+
+
+def _nearest_ahead(
+    points: Floats, tangent: Floats, starts: Ints, ends: Ints, reach: Floats
+) -> tuple[Ints, Floats]:
+    """The run (r,) whose start is nearest to the end of each one, within its `reach` (r,) and ahead of it, -1
+    for none; and how far away (r,).
+
+    A short run's own start and that of the run before it may be nearer than that of the next, but both lie
+    behind.
+    """
+    count = min(NEAR, len(starts))
+    gap, near = cKDTree(points[starts]).query(points[ends], k=np.arange(1, count + 1))
+    way = points[starts[near]] - points[ends][:, None]
+    heading = tangent[ends][:, None] + tangent[starts[near]]
+    fits = (np.einsum("rkc,rkc->rk", way, heading) > 0) & (gap < reach[:, None])
+    # two that touch are one line, but for a run of one sample, whose start is its end
+    fits |= (gap == 0) & (near != np.arange(len(ends))[:, None])
+    first = fits.argmax(axis=1)
+    pick = np.arange(len(ends))
+    return np.where(fits[pick, first], near[pick, first], -1), gap[pick, first]
 
 
 def _first_claim(follows: Ints, gap: Floats) -> Bools:
@@ -165,50 +259,62 @@ def _runs(loop: Ints, position: Ints, sizes: Ints) -> tuple[list[Ints], list[boo
     return runs, whole
 
 
-def _knots(
-    charts: Charts, boundary: Boundary, radius: Lengths, spots: Spots, chain: list[Ints], closed: bool
-) -> tuple[Spots, bool]:
-    """Knots of one line: samples, the corners between the runs, and no gap wider than half a radius."""
-    rows: list[Ints] = []
-    barys: list[Floats] = []
-    for number, run in enumerate(chain):
-        rows.append(spots.row[run])
-        barys.append(spots.barycentric[run])
-        if number + 1 < len(chain) or closed:
-            corner = _corner(charts, spots, run, chain[(number + 1) % len(chain)])
-            if corner is not None and _keeps_radius(charts, boundary, radius, corner):
-                rows.append(corner.row)
-                barys.append(corner.barycentric)
-    if closed:
-        rows.append(rows[0][:1])
-        barys.append(barys[0][:1])
-    knots = Spots(np.concatenate(rows), np.concatenate(barys))
-    return _filled(charts, boundary, radius, knots), closed
+def _with_corners(
+    charts: Charts, boundary: Boundary, radius: Lengths, spots: Spots, chains: list[Chain]
+) -> tuple[Spots, list[tuple[Ints, bool]]]:
+    """The samples and, after them, the corners where runs meet; and the rows of each line's knots in order,
+    the first once more at the end of one that closes, and whether it does.
+    """
+    followed = [
+        (run, after) for chain, closed in chains for run, after in pairwise(chain + chain[:1] * closed)
+    ]
+    long = np.flatnonzero([len(run) > 1 and len(after) > 1 for run, after in followed])
+    around = [[*followed[number][0][-2:], *followed[number][1][:2]] for number in long]
+    corner, meets = _corners(charts, spots, np.array(around, dtype=np.int64).reshape(-1, 4))
+    distance, foot = _to_boundary(charts, boundary, corner)
+    share = distance / radius(corner)
+    # beside a rounded corner of the boundary lines meet outside the inset line
+    on_line = share > 1 - NEARLY
+    # and where short runs about two teeth do, on its inner side
+    aside = np.flatnonzero(share > 1 + NEARLY)
+    known = distance[aside], foot[aside]
+    corner.row[aside], corner.barycentric[aside] = _settled(
+        charts, boundary, radius, corner.take(aside), known
+    )
+    corner = corner.take(on_line)
+    between = np.full(len(followed), -1)
+    between[long[meets][on_line]] = len(spots.row) + np.arange(len(corner.row))
+    lines, corners = [], iter(between)
+    for chain, closed in chains:
+        rows = [chain[0]]
+        for _, after in pairwise(chain + chain[:1] * closed):
+            number = next(corners)
+            rows += [np.array([number]), after] if number >= 0 else [after]
+        if closed:
+            rows[-1] = rows[-1][:1]
+        lines.append((np.concatenate(rows), closed))
+    return joined(spots, corner), lines
 
 
-def _corner(charts: Charts, spots: Spots, before: Ints, after: Ints) -> Spots | None:
-    """Where the line that ends a run meets the one that begins the next; None where they already touch."""
-    if len(before) < 2 or len(after) < 2:
-        return None
-    points = positions(charts, spots.take(np.array([before[-2], before[-1], after[0], after[1]])))
-    ahead, back = points[1] - points[0], points[2] - points[3]
-    ahead, back = ahead / np.linalg.norm(ahead), back / np.linalg.norm(back)
-    between = points[2] - points[1]
-    cosine = float(ahead @ back)
+def _corners(charts: Charts, spots: Spots, around: Ints) -> tuple[Spots, Ints]:
+    """Where the lines through the last two samples of one run and the first two of the next meet between
+    them; of these samples (j, 4) which rows do. Others touch already, or go on round a bend.
+    """
+    points = positions(charts, spots.take(around.ravel())).reshape(-1, 4, 3)
+    ahead, back = points[:, 1] - points[:, 0], points[:, 2] - points[:, 3]
+    ahead, back = (way / np.maximum(np.sqrt(dots(way, way)), 1e-300)[:, None] for way in (ahead, back))
+    between = points[:, 2] - points[:, 1]
+    cosine = dots(ahead, back)
     # The nearest points of two lines in space; nearly parallel ones meet in no corner.
-    if 1 - cosine**2 < np.sin(np.radians(5.0)) ** 2:
-        return None
-    reach = (between @ ahead - cosine * (between @ back)) / (1 - cosine**2)
-    if not 0 <= reach <= 4 * np.linalg.norm(between) + 1e-300:
-        return None
-    last = spots.take(before[-1:])
-    return walk(charts, last, to_frame(charts, last.row, reach * ahead[None])).arrived
-
-
-def _keeps_radius(charts: Charts, boundary: Boundary, radius: Lengths, corner: Spots) -> bool:
-    """Whether a corner is on the inset line: beside a rounded one, lines meet outside it."""
-    distance, _ = _to_boundary(charts, boundary, corner)
-    return bool((distance > (1 - 1e-2) * radius(corner)).all())
+    meeting = 1 - cosine**2 >= np.sin(np.radians(5.0)) ** 2
+    share = np.where(meeting, 1 - cosine**2, 1.0)
+    reach = (dots(between, ahead) - cosine * dots(between, back)) / share
+    meeting &= (reach >= 0) & (reach <= 4 * np.linalg.norm(between, axis=1) + 1e-300)
+    meeting &= reach * cosine >= dots(between, back)
+    meets = np.flatnonzero(meeting)
+    last = spots.take(around[meets, 1])
+    way = to_frame(charts, last.row, reach[meets, None] * ahead[meets])
+    return walk(charts, last, way).arrived, meets
 
 
 def _filled(charts: Charts, boundary: Boundary, radius: Lengths, knots: Spots) -> Spots:
@@ -226,7 +332,4 @@ def _filled(charts: Charts, boundary: Boundary, radius: Lengths, knots: Spots) -
     added = walk(charts, start, to_frame(charts, start.row, step)).arrived
     added = _settled(charts, boundary, radius, added, rounds=5)
     place = np.argsort(np.concatenate([np.arange(len(points)), owner + share]), kind="stable")
-    return Spots(
-        np.concatenate([knots.row, added.row])[place],
-        np.concatenate([knots.barycentric, added.barycentric])[place],
-    )
+    return joined(knots, added).take(place)

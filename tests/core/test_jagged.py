@@ -1,0 +1,98 @@
+"""Regions chosen face by face from a grid or a scan: the first row goes all round their jagged boundary."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial import Delaunay, cKDTree
+
+from bubble_pattern_addon.core.boundary import make_boundary, nearest_boundary
+from bubble_pattern_addon.core.mesh import Floats, Mesh
+from bubble_pattern_addon.core.metric import Constant
+from bubble_pattern_addon.core.packing.pack import pack_steps
+from bubble_pattern_addon.core.progress import drive
+from bubble_pattern_addon.core.recipe import Packing
+from bubble_pattern_addon.core.region import Region, make_region
+from bubble_pattern_addon.core.surface import positions
+from scripts.moulding import counter_clockwise
+from scripts.shapes import grid_sheet, tube_sheet
+
+RADIUS = 40.0
+"""Of the discs, whose faces are about one long."""
+
+
+def raised(flat: Floats, curved: bool) -> Floats:
+    """Places in plan on a plane or on a cap."""
+    return np.column_stack([flat, -curved * (flat**2).sum(axis=1) / 180])
+
+
+def pixels(curved: bool, shift: float) -> Region:
+    """A disc of the squares of a grid."""
+    grid = np.arange(-45.0, 46.0)
+    plane = grid_sheet(grid, grid, lambda u, v: np.stack([u, v, 0 * u], axis=1))
+    middle = np.floor(plane.corners.mean(axis=1)[:, :2]) + 0.5
+    return make_region(
+        Mesh(raised(plane.vertices[:, :2], curved), plane.triangles),
+        np.linalg.norm(middle + shift, axis=1) < RADIUS,
+    )
+
+
+def splinters(curved: bool, seed: int) -> Region:
+    """A disc of triangles between places at random."""
+    flat = np.random.default_rng(seed).uniform(-45, 45, (9000, 2))
+    triangles = counter_clockwise(flat, Delaunay(flat).simplices.astype(np.int64))
+    middle = flat[triangles].mean(axis=1)
+    return make_region(Mesh(raised(flat, curved), triangles), np.linalg.norm(middle, axis=1) < RADIUS)
+
+
+def packed(region: Region, pitch: float) -> tuple[Floats, Floats, int]:
+    """Places of the bubbles, their distances to the boundary in pitches, and the size of the first row."""
+    ground, bubbles = drive(pack_steps(region, Packing(pitch=Constant(pitch))))
+    points = positions(ground.charts, bubbles.spots)
+    boundary = make_boundary(region, pitch / 8)
+    assert boundary is not None
+    return points, nearest_boundary(boundary, points, bubbles.spots.row)[0] / pitch, bubbles.fixed
+
+
+def check_round(points: Floats, away: Floats, first: int, pitch: float) -> None:
+    """The first row stands half a pitch from the boundary of the disc and goes on all round it."""
+    assert away.min() > 0.47
+    assert np.abs(away[:first] - 0.5).max() < 0.05
+    angle = np.sort(np.arctan2(points[:first, 1], points[:first, 0]))
+    gap = np.diff(angle, append=angle[0] + 2 * np.pi) * (RADIUS - pitch / 2) / pitch
+    # where the line turns between two long teeth a bubble stands, and the others keep clear of it
+    assert gap.max() < 1.9
+    assert abs(gap.mean() - 1) < 0.1
+
+
+@settings(max_examples=12, deadline=None)
+@given(curved=st.booleans(), shift=st.floats(0, 1), pitch=st.floats(3.5, 14))
+def test_the_first_row_goes_round_a_disc_of_squares(curved: bool, shift: float, pitch: float) -> None:
+    check_round(*packed(pixels(curved, shift), pitch), pitch)
+
+
+@settings(max_examples=12, deadline=None)
+@given(curved=st.booleans(), seed=st.integers(0, 1000), pitch=st.floats(3.5, 14))
+def test_the_first_row_goes_round_a_disc_of_splinters(curved: bool, seed: int, pitch: float) -> None:
+    check_round(*packed(splinters(curved, seed), pitch), pitch)
+
+
+@pytest.mark.parametrize("pitch", [2.4, 3.3, 6.0])
+def test_the_first_row_goes_round_teeth(pitch: float) -> None:
+    tube = tube_sheet(15, 80, 96, 80)
+    # every square of the tube is two triangles, of which one is taken where the region ends
+    along = tube.corners.mean(axis=1)[:, 2]
+    points, away, first = packed(make_region(tube, (along > 9.5) & (along < 69.5)), pitch)
+    assert away.min() > 0.48
+    for end in (points[:first, 2] < 40, points[:first, 2] > 40):
+        assert end.sum() == pytest.approx(2 * np.pi * 15 / pitch, rel=0.06)
+    places = positions_on(tube, 10 + pitch / 2, 69 - pitch / 2)
+    assert cKDTree(points).query(places)[0].max() < 0.95 * pitch
+
+
+def positions_on(tube: Mesh, low: float, high: float) -> Floats:
+    """Middles of the tube's faces between two heights."""
+    middle = tube.corners.mean(axis=1)
+    return middle[(middle[:, 2] > low) & (middle[:, 2] < high)]
