@@ -22,6 +22,8 @@ FINENESS = 5
 GOLDEN = (np.sqrt(5) - 1) / 2
 # Starts of runs looked at for the one that goes on from the end of another.
 NEAR = 6
+# Samples of two sides of a corner may reach over one another by this much, in radii.
+OVERLAP = 0.1
 # A corner this near the inset line, as a share of the radius, is on it.
 NEARLY = 1e-2
 
@@ -76,17 +78,30 @@ def _walked_inward(charts: Charts, boundary: Boundary, radius: Lengths) -> Walke
     distance, foot = _to_boundary(charts, boundary, walked.arrived)
     kept = (walked.left == 0) & (distance >= size * (1 - 1e-3))
     edges = [len(loop) for loop in region.loops]
-    loop = np.repeat(np.arange(len(edges)), edges)[owner]
-    arrived, known = walked.arrived.take(kept), (distance[kept], foot[kept])
+    loop_of = np.repeat(np.arange(len(edges)), edges)[owner]
+    arrived, loop = walked.arrived.take(kept), loop_of[kept]
+    distance, foot, sizes = distance[kept], foot[kept], np.bincount(loop_of, minlength=len(edges))
+    spots = _settled(charts, boundary, radius, arrived, (distance, foot))
     # the region is on the left of its boundary
-    tangent = np.cross(positions(charts, arrived) - known[1], region.normals[arrived.row])
-    return Walked(
-        _settled(charts, boundary, radius, arrived, known),
-        tangent,
-        loop[kept],
-        np.flatnonzero(kept),
-        np.bincount(loop, minlength=len(edges)),
-    )
+    tangent = np.cross(positions(charts, arrived) - foot, region.normals[arrived.row])
+    some = _in_order(positions(charts, spots), tangent, loop, OVERLAP * radius(spots))
+    return Walked(spots.take(some), tangent[some], loop[some], np.flatnonzero(kept)[some], sizes)
+
+
+def _in_order(points: Floats, tangent: Floats, loop: Ints, reach: Floats) -> Ints:
+    """Samples that stand in the order of their loops (m,), without those that are behind the one before them,
+    but within its `reach` (m,): where the line turns gently outward, samples of both sides may be kept beyond
+    the corner.
+    """
+    some = np.arange(len(points))
+    while len(some):
+        after = some[_next_in_groups(np.bincount(loop[some]))]
+        way = points[after] - points[some]
+        behind = (dots(way, tangent[some] + tangent[after]) < 0) & (dots(way, way) < reach[some] ** 2)
+        if not behind.any():
+            break
+        some = np.setdiff1d(some, after[behind])
+    return some
 
 
 def _samples(charts: Charts, radius: Lengths) -> tuple[Ints, Floats, Floats]:
@@ -115,9 +130,17 @@ def _samples(charts: Charts, radius: Lengths) -> tuple[Ints, Floats, Floats]:
 
 def _next_edges(region: Region) -> Ints:
     """The boundary edge (S,) that follows each one on its loop."""
-    last = np.cumsum([len(loop) for loop in region.loops])
+    return _next_in_groups(np.array([len(loop) for loop in region.loops]))
+
+
+def _next_in_groups(sizes: Ints) -> Ints:
+    """What follows each of many things in its group, of these `sizes` one after the other; the first follows
+    the last.
+    """
+    sizes = sizes[sizes > 0]
+    last = np.cumsum(sizes)
     following = np.arange(1, last[-1] + 1)
-    following[last - 1] = np.append(0, last[:-1])
+    following[last - 1] = last - sizes
     return following
 
 
@@ -188,8 +211,7 @@ def _joined(points: Floats, walked: Walked, radius: Floats) -> list[Chain]:
     pieces = [run for run, alone in zip(runs, whole, strict=True) if not alone]
     if not pieces:
         return chains
-    starts = np.array([run[0] for run in pieces])
-    ends = np.array([run[-1] for run in pieces])
+    starts, ends = np.array([[run[0], run[-1]] for run in pieces]).T
     follows, gap = _nearest_ahead(points, walked.tangent, starts, ends, 0.8 * radius[ends])
     follows[~_first_claim(follows, gap)] = -1
     led = np.zeros(len(pieces), dtype=bool)
@@ -216,15 +238,14 @@ def _nearest_ahead(
     A short run's own start and that of the run before it may be nearer than that of the next, but both lie
     behind.
     """
-    count = min(NEAR, len(starts))
+    count, pick = min(NEAR, len(starts)), np.arange(len(starts))
     gap, near = cKDTree(points[starts]).query(points[ends], k=np.arange(1, count + 1))
     way = points[starts[near]] - points[ends][:, None]
     heading = tangent[ends][:, None] + tangent[starts[near]]
     fits = (np.einsum("rkc,rkc->rk", way, heading) > 0) & (gap < reach[:, None])
     # two that touch are one line, but for a run of one sample, whose start is its end
-    fits |= (gap == 0) & (near != np.arange(len(ends))[:, None])
+    fits |= (gap == 0) & (near != pick[:, None])
     first = fits.argmax(axis=1)
-    pick = np.arange(len(ends))
     return np.where(fits[pick, first], near[pick, first], -1), gap[pick, first]
 
 
