@@ -120,6 +120,7 @@ def _samples(charts: Charts, radius: Lengths) -> tuple[Ints, Floats, Floats]:
     number = leaving + along + arriving
     owner = np.repeat(np.arange(len(number)), number)
     place = np.arange(len(owner)) - np.repeat(np.cumsum(number) - number, number)
+    # places left until those along the edge begin, and places since these have ended
     before, after = leaving[owner] - place, place - (leaving + along)[owner]
     share = np.clip((0.5 - before) / along[owner], 0, 1)
     step, phase = away / 2 / np.maximum(leaving, 1), np.arange(len(number)) * GOLDEN % 1
