@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from .cycles import members
 from .mesh import Floats, Ints
 from .region import Region
 from .vectors import dots
@@ -46,8 +47,8 @@ def make_boundary(region: Region, spacing: float) -> Boundary | None:
     along = region.boundary_segments[:, 1].T - start
     square = np.einsum("cs,cs->s", along, along)
     number = np.maximum(np.ceil(np.sqrt(square) / spacing).astype(np.int64), 1)
-    owner = np.repeat(np.arange(len(square)), number)
-    share = (np.arange(len(owner)) - np.repeat(np.cumsum(number) - number, number) + 0.5) / number[owner]
+    owner, place = members(number)
+    share = (place + 0.5) / number[owner]
     points = (start[:, owner] + share * along[:, owner]).T
     row = region.rim[owner, 0]
     reach = 8 * spacing

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .cycles import next_round
 from .feature_recipe import Feature
 from .feature_sizes import FeatureSizes, sides
 from .loft import frames, lids
@@ -69,9 +70,7 @@ class Columns:
     @property
     def following(self) -> Ints:
         """The next corner round, (K,)."""
-        following = np.arange(1, len(self.outline) + 1)
-        following[self.start[1:] - 1] = self.start[:-1]
-        return following
+        return next_round(np.diff(self.start))
 
     @property
     def reach(self) -> Floats:

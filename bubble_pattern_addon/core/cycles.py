@@ -23,6 +23,23 @@ def followed(following: Ints, first: Ints, total: Ints) -> Ints:
     return rows
 
 
+def members(number: Ints) -> tuple[Ints, Ints]:
+    """Of groups of `number` members, (n,), which lie one after the other: the group of each member and its
+    place there, from 0.
+    """
+    owner = np.repeat(np.arange(len(number)), number)
+    return owner, np.arange(len(owner)) - np.repeat(np.cumsum(number) - number, number)
+
+
+def next_round(number: Ints) -> Ints:
+    """The member that comes after each one of such groups; after the last one of a group its first."""
+    number = number[number > 0]
+    end = np.cumsum(number)
+    following = np.arange(1, number.sum() + 1)
+    following[end - 1] = end - number
+    return following
+
+
 def ranges(start: Ints, number: Ints) -> Ints:
     """`number`, (n,), whole numbers from each `start`, (n,), on, end to end."""
     before = np.cumsum(number) - number

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .cycles import members
 from .mesh import Floats, Ints
 
 if TYPE_CHECKING:
@@ -84,8 +85,7 @@ def _short_pieces(segments: Floats) -> Floats:
     length = np.linalg.norm(b - a, axis=1)
     longest = length.sum() / max(len(segments), 64)
     count = np.maximum(np.ceil(length / longest), 1).astype(int) if longest > 0 else np.ones(len(a), int)
-    owner = np.repeat(np.arange(len(a)), count)
-    index = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
+    owner, index = members(count)
     start = (index / count[owner])[:, None]
     end = ((index + 1) / count[owner])[:, None]
     along = (b - a)[owner]

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
+from .cycles import members
 from .errors import RegionError
 from .flattening import Flat, flatten
 from .mesh import Bools, Floats, Ints
@@ -320,10 +321,8 @@ def _reaching(centre: Floats, diameter: Floats, cuts: tuple[Line, ...]) -> int:
         ends = np.stack([line.points[:-1], line.points[1:]], axis=1)
         length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         number = np.ceil(length / step).astype(np.int64) + 1
-        owner = np.repeat(np.arange(len(ends)), number)
-        share = (np.arange(len(owner)) - np.repeat(np.cumsum(number) - number, number)) / (
-            number[owner] - 1
-        ).clip(1)
+        owner, place = members(number)
+        share = place / (number[owner] - 1).clip(1)
         samples.append(ends[owner, 0] + share[:, None] * (ends[owner, 1] - ends[owner, 0]))
     distance, _ = cKDTree(np.concatenate(samples)).query(centre)
     return int((distance < diameter / 2 * (1 - 1e-3)).sum())

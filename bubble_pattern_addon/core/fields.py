@@ -66,6 +66,7 @@ class Linear(Graded):
                 )
 
         def share(places: Places) -> Floats:
+            """How far along the way places are, (n,)."""
             return (places.position @ along - low) / (high - low)
 
         return share
@@ -107,6 +108,7 @@ class Radial(Graded):
         centre, axis = self._about(surroundings)
 
         def distance(points: Floats) -> Floats:
+            """From the centre, or from the axis through it, (n,)."""
             away = points - centre
             if axis is not None:
                 away = away - (away @ axis)[:, None] * axis

@@ -86,6 +86,7 @@ def _together(footprints: Sequence[Footprint]) -> Function:
     extent = np.array([footprint.extent for footprint in footprints])
 
     def function(points: Floats, row: Ints) -> Level:
+        """Distances (n,) and how fine to be there, for points on the triangles `row` (n,)."""
         value, nearest = np.full(len(points), np.inf), np.zeros(len(points), dtype=np.int64)
         for number, footprint in enumerate(footprints):
             distance = footprint.distance(points, row) - footprint.margin
@@ -138,6 +139,7 @@ def _distance_to(boundary: Boundary) -> Callable[[Floats, Ints], Floats]:
     towards = region.normals[region.rim[:, 0]]
 
     def distance(points: Floats, row: Ints) -> Floats:
+        """Of points on the triangles `row` (n,)."""
         found, _ = nearest_boundary(boundary, points, row)
         _, sample = boundary.tree.query(signature(region, points, row, boundary.reach))
         cosine = dots(region.normals[row], towards[boundary.owner[sample]])
@@ -203,6 +205,7 @@ def frame_along(axis: Floats, along: Floats | None = None) -> Floats:
 
 def _ball(centre: Floats, diameter: float, margin: float) -> Footprint:
     def distance(points: Floats, row: Ints) -> Floats:
+        """From the sphere, negative inside, (n,)."""
         return np.linalg.norm(points - centre, axis=1) - diameter / 2
 
     return Footprint(distance, margin, diameter + 2 * margin, "a sphere")
@@ -212,6 +215,7 @@ def _rectangle(half: Floats) -> Callable[[Floats], Floats]:
     """Signed distance to a rectangle round the origin of half the widths `half` (2,)."""
 
     def across(flat: Floats) -> Floats:
+        """Of points (n, 2), negative inside."""
         over = np.abs(flat) - half
         return np.hypot(*np.maximum(over, 0).T) + np.minimum(over.max(axis=1), 0)
 
@@ -236,6 +240,7 @@ class _Shadow:
         """Footprint of the outline whose signed distance in the plane `across` tells of points (n, 2)."""
 
         def distance(points: Floats, row: Ints) -> Floats:
+            """From the body that the outline makes along the axis, negative inside, (n,)."""
             seen = (points - self.origin) @ self.frame.T
             flat = across(seen[:, :2])
             if self.reach is None:
@@ -287,6 +292,7 @@ def _polygons(outline: Floats, margin: float) -> Callable[[Floats], Floats]:
     slope = (x1 - x0) / np.where(y1 == y0, 1.0, y1 - y0)
 
     def across(flat: Floats) -> Floats:
+        """Of points (n, 2), negative inside."""
         over = np.maximum(np.maximum(low - flat, flat - high), 0)
         away = np.hypot(*over.T)
         # far from an outline it does not matter how far: the box round it is near enough

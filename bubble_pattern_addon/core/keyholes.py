@@ -15,7 +15,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import minimum_spanning_tree
 from scipy.spatial import Delaunay, cKDTree
 
-from .cycles import ranges, unrolled
+from .cycles import next_round, ranges, unrolled
 from .mesh import Floats, Ints
 
 
@@ -37,7 +37,7 @@ def opened(points: Floats, contours: Contours, cell: Ints, outer: int) -> Contou
     start = np.cumsum(contours.total) - contours.total
     at = points[contours.vertex]
     cuts = _cuts(at, start, contours.total, cell, outer)
-    onward = _onward(at, start, contours.total, cuts)
+    onward = _onward(at, contours.total, cuts)
     # there are as many cuts as holes
     holes = np.bincount(cell[outer:], minlength=outer)
     total = np.bincount(cell, contours.total, outer).astype(np.int64) + 2 * holes
@@ -91,12 +91,11 @@ def _farthest(at: Floats, start: Ints, total: Ints, hole: Ints, way: Floats) -> 
     return first
 
 
-def _onward(at: Floats, start: Ints, total: Ints, cuts: Ints) -> Ints:
+def _onward(at: Floats, total: Ints, cuts: Ints) -> Ints:
     """What comes after each row of `at` (P, 2), and after these each way along a cut: from its first end to
     its second, then back; (P + 2 k,).
     """
-    following = np.arange(1, len(at) + 1)
-    following[start + total - 1] = start
+    following = next_round(total)
     before = np.empty(len(at), dtype=np.int64)
     before[following] = np.arange(len(at))
     end, there = cuts.ravel(), cuts[:, ::-1].ravel()

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from .cycles import members
 from .mesh import Bools, Floats, Ints
 from .metric import Places
 from .region import Region
@@ -77,8 +78,8 @@ class Charts:
         sides = np.linalg.norm(np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1), axis=2)
         spacing = np.sqrt(self.region.area / SIGNPOSTS)
         number = np.clip(np.ceil(sides.max(axis=1) / spacing), 1, SIGNPOSTS // 10).astype(np.int64)
-        owner = np.repeat(np.arange(len(corners)), number)
-        share = (np.arange(len(owner)) - np.repeat(np.cumsum(number) - number, number) + 0.5) / number[owner]
+        owner, place = members(number)
+        share = (place + 0.5) / number[owner]
         # Along the line from the middle of the shortest side to the corner opposite to it.
         bary = np.repeat((1 - share)[:, None] / 2, 3, axis=1)
         bary[np.arange(len(owner)), sides.argmin(axis=1)[owner]] = share
@@ -159,8 +160,8 @@ def on_region(region: Region, places: Places) -> Spots:
     if region.within is None:
         return Spots(first, places.barycentric)
     number = np.searchsorted(region.triangles, places.triangle, side="right") - first
-    owner = np.repeat(np.arange(len(first)), number)
-    piece = first[owner] + np.arange(len(owner)) - np.repeat(np.cumsum(number) - number, number)
+    owner, place = members(number)
+    piece = first[owner] + place
     # in the piece where the smallest coordinate is largest
     inside = np.einsum("nk,nkc->nc", places.barycentric[owner], np.linalg.inv(region.within[piece]))
     order = np.lexsort((piece, -inside.min(axis=1), owner))
@@ -376,8 +377,7 @@ def _corner_normals(region: Region, rows: Ints) -> Floats:
     # Every corner meets all corners at its vertex, itself among them.
     asked = (3 * rows[:, None] + np.arange(3)).ravel()
     number = count[vertices[asked]]
-    own = np.repeat(np.arange(len(asked)), number)
-    turn = np.arange(len(own)) - np.repeat(np.cumsum(number) - number, number)
+    own, turn = members(number)
     other = order[start[vertices[asked[own]]] + turn] // 3
     normals = region.normals
     smooth = dots(normals[asked[own] // 3], normals[other]) > np.cos(CREASE)

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from .boundary import Boundary, nearest_boundary
+from .cycles import members
 from .isometries import AUTO, OFF, Isometries, image_of, isometries, words_of
 from .mesh import Floats, Ints
 from .region import Region
@@ -73,8 +74,8 @@ def make_finder(charts: Charts, reach: float) -> Finder:
     sides = np.linalg.norm(np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1), axis=2)
     spacing = np.sqrt(charts.region.area / SAMPLES)
     number = np.clip(np.ceil(sides.max(axis=1) / spacing), 1, 100).astype(np.int64)
-    owner = np.repeat(np.arange(len(corners)), number)
-    share = (np.arange(len(owner)) - np.repeat(np.cumsum(number) - number, number) + 0.5) / number[owner]
+    owner, place = members(number)
+    share = (place + 0.5) / number[owner]
     # Along the line from the middle of the shortest side to the corner opposite to it.
     bary = np.repeat((1 - share)[:, None] / 2, 3, axis=1)
     bary[np.arange(len(owner)), sides.argmin(axis=1)[owner]] = share

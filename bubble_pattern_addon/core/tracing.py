@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .columns import Columns
+from .cycles import next_round
 from .mesh import Bools, Floats, Ints, Mesh
 from .ranking import numbered
 
@@ -59,10 +60,7 @@ class Traces:
     @property
     def following(self) -> Ints:
         """The next crossing of the same way, (X,)."""
-        start = np.flatnonzero(self.first)
-        following = np.arange(1, len(self.way) + 1)
-        following[np.append(start[1:], len(self.way))[: len(start)] - 1] = start
-        return following
+        return next_round(np.diff(np.flatnonzero(self.first), append=len(self.way)))
 
 
 @dataclass(frozen=True)

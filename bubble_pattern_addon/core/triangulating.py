@@ -7,7 +7,7 @@ from itertools import pairwise
 import manifold3d
 import numpy as np
 
-from .cycles import ranges
+from .cycles import next_round, ranges
 from .keyholes import Contours, opened
 from .mesh import Bools, Floats, Ints
 
@@ -70,8 +70,7 @@ def _around(flat: Floats, start: Ints, total: Ints, cell: Ints, outer: int) -> I
     contour = order[ranges(first[at], (end - first)[at])]
     row = ranges(start[contour], total[contour])
     pair = np.repeat(np.arange(len(contour)), total[contour])
-    following = row + 1
-    following[np.cumsum(total[contour]) - 1] = start[contour]
+    following = row[next_round(total[contour])]
     (px, py), (qx, qy), (x, y) = flat[row].T, flat[following].T, flat[start[outer + hole[pair]]].T
     passes = (py > y) != (qy > y)
     beyond = px + (y - py) / np.where(passes, qy - py, 1) * (qx - px) > x
@@ -101,8 +100,7 @@ def _with_holes(laid: Floats, start: Ints, total: Ints, owner: Ints, chosen: Int
 def _enclosed(flat: Floats, start: Ints, total: Ints, owner: Ints) -> Floats:
     """Twice the area that each outer contour encloses, without its holes."""
     x, y = flat.T
-    following = np.arange(1, len(x) + 1)
-    following[start + total - 1] = start
+    following = next_round(total)
     return np.bincount(owner, np.add.reduceat(x * y[following] - x[following] * y, start))
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..boundary import Boundary, nearest_boundary
+from ..cycles import members, next_round
 from ..mesh import Bools, Floats, Ints
 from ..region import Region
 from ..surface import Charts, Spots, positions, to_frame, walk
@@ -95,7 +96,7 @@ def _in_order(points: Floats, tangent: Floats, loop: Ints, reach: Floats) -> Int
     """
     some = np.arange(len(points))
     while len(some):
-        after = some[_next_in_groups(np.bincount(loop[some]))]
+        after = some[next_round(np.bincount(loop[some]))]
         way = points[after] - points[some]
         behind = (dots(way, tangent[some] + tangent[after]) < 0) & (dots(way, way) < reach[some] ** 2)
         if not behind.any():
@@ -118,8 +119,7 @@ def _samples(charts: Charts, radius: Lengths) -> tuple[Ints, Floats, Floats]:
     following = _next_edges(charts.region)
     arriving = leaving[following]
     number = leaving + along + arriving
-    owner = np.repeat(np.arange(len(number)), number)
-    place = np.arange(len(owner)) - np.repeat(np.cumsum(number) - number, number)
+    owner, place = members(number)
     # places left until those along the edge begin, and places since these have ended
     before, after = leaving[owner] - place, place - (leaving + along)[owner]
     share = np.clip((0.5 - before) / along[owner], 0, 1)
@@ -131,18 +131,7 @@ def _samples(charts: Charts, radius: Lengths) -> tuple[Ints, Floats, Floats]:
 
 def _next_edges(region: Region) -> Ints:
     """The boundary edge (S,) that follows each one on its loop."""
-    return _next_in_groups(np.array([len(loop) for loop in region.loops]))
-
-
-def _next_in_groups(sizes: Ints) -> Ints:
-    """What follows each of many things in its group, of these `sizes` one after the other; the first follows
-    the last.
-    """
-    sizes = sizes[sizes > 0]
-    last = np.cumsum(sizes)
-    following = np.arange(1, last[-1] + 1)
-    following[last - 1] = last - sizes
-    return following
+    return next_round(np.array([len(loop) for loop in region.loops]))
 
 
 def _turns(region: Region) -> Floats:
@@ -344,11 +333,10 @@ def _filled(charts: Charts, boundary: Boundary, radius: Lengths, knots: Spots) -
     points = positions(charts, knots)
     gap = np.linalg.norm(np.diff(points, axis=0), axis=1)
     number = np.ceil(gap / (0.5 * radius(knots)[:-1])).astype(np.int64)
-    owner = np.repeat(np.arange(len(gap)), np.maximum(number - 1, 0))
+    owner, order = members(np.maximum(number - 1, 0))
     if not len(owner):
         return knots
-    order = np.arange(len(owner)) - np.searchsorted(owner, owner) + 1
-    share = order / number[owner]
+    share = (order + 1) / number[owner]
     start = knots.take(owner)
     step = (points[owner + 1] - points[owner]) * share[:, None]
     added = walk(charts, start, to_frame(charts, start.row, step)).arrived

@@ -7,6 +7,7 @@ from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
 from ..boundary import nearest_boundary, signature
+from ..cycles import members
 from ..mesh import Bools, Floats, Ints
 from ..surface import Charts, Spots, positions, to_frame, walk
 from ..vectors import dots
@@ -287,8 +288,7 @@ def _triples(pairs: Ints, n: int) -> Ints:
     link = csr_array((np.ones(len(low), dtype=np.int8), (low, high)), shape=(n, n))
     degree = np.diff(link.indptr)
     # For every pair (i, j) all k linked from j: a triple where (i, k) is a pair too.
-    owner = np.repeat(np.arange(len(low)), degree[high])
-    offset = np.arange(len(owner)) - np.repeat(np.cumsum(degree[high]) - degree[high], degree[high])
+    owner, offset = members(degree[high])
     third = link.indices[link.indptr[high[owner]] + offset]
     code = np.sort(low.astype(np.int64) * n + high)
     sought = low[owner].astype(np.int64) * n + third
