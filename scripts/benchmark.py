@@ -23,7 +23,7 @@ if __name__ == "__main__":
     environment.enter_for_lack_of(environment.CORE, "benchmark")
 
 from scripts.benchmark_adding import add_once, adding, blender
-from scripts.benchmark_packing import curved, flat, graded, pack_once
+from scripts.benchmark_packing import curved, flat, graded, jagged, pack_once
 from scripts.benchmark_symmetry import symmetric
 from scripts.measuring import installed
 from scripts.shapes import curved_slab
@@ -47,6 +47,7 @@ SECTIONS: dict[str, Callable[[int], None]] = {
     "flat": flat,
     "curved": curved,
     "graded": graded,
+    "jagged": jagged,
     "symmetric": symmetric,
     "adding": adding,
     "blender": blender,

@@ -23,7 +23,17 @@ from bubble_pattern_addon.core.recipe import Packing, Recipe, Shaping
 from bubble_pattern_addon.core.region import Region, make_region
 from scripts import peers
 from scripts.measuring import in_turn, installed, number, own_peak, peak_memory, print_head
-from scripts.shapes import SHAPES, Shape, circle, rectangle_outline, trapezoid_outline
+from scripts.shapes import (
+    JAGGED_RADIUS,
+    SHAPES,
+    Shape,
+    circle,
+    curved_slab,
+    pixel_disc,
+    rectangle_outline,
+    splinter_disc,
+    trapezoid_outline,
+)
 
 
 @dataclass(frozen=True)
@@ -77,6 +87,11 @@ def pack(shape: Shape, pitch: float) -> tuple[Pattern, Region, float]:
     return pattern, region, time.perf_counter() - start
 
 
+def packing_seconds(shape: Shape, pitch: float) -> float:
+    """How long `pack` takes."""
+    return pack(shape, pitch)[2]
+
+
 def mirrored(position: Floats, pitch: float) -> float:
     """Largest distance, in pitches, from a point mirrored at the plane x = 0 to the nearest point."""
     return float(cKDTree(position).query(position * [-1, 1, 1])[0].max() / pitch)
@@ -116,7 +131,7 @@ def against(
     """Our packing and a peer at the same count in turn; prints both rows, returns our count."""
     pattern, region, _ = pack(shape, pitch)
     runs: list[Callable[[], float]] = [
-        lambda: pack(shape, pitch)[2],
+        partial(packing_seconds, shape, pitch),
         partial(packed_in, region, uniform(pitch)),
     ]
     if arrange is None:
@@ -213,6 +228,35 @@ def packed_in(region: Region, recipe: Recipe) -> float:
     start = time.perf_counter()
     drive(pattern_steps(region, recipe))
     return time.perf_counter() - start
+
+
+def jagged(repeats: int) -> None:
+    """How far the first row goes round discs of faces chosen from a grid or a scan."""
+    print("\n## First rows along jagged boundaries\n")
+    print("Discs of faces about 1 long (the panel's: 0.5); room: for so many at the pitch; gaps in pitches.")
+    print_head("| region | pitch | n | first row | room | widest gap | mean gap | least edge | seconds |")
+    panel = curved_slab(400)
+    away = np.linalg.norm(panel.mesh.corners.mean(axis=1)[:, :2], axis=1)
+    scan = replace(panel, selected=panel.selected & (away < 80))
+    discs = [
+        ("squares of a grid", pixel_disc(False), JAGGED_RADIUS, (3.0, 6.0, 12.0)),
+        ("the same on a cap", pixel_disc(True), JAGGED_RADIUS, (3.0, 6.0, 12.0)),
+        ("splinters", splinter_disc(False), JAGGED_RADIUS, (3.0, 6.0, 12.0)),
+        ("the same on a cap", splinter_disc(True), JAGGED_RADIUS, (3.0, 6.0, 12.0)),
+        ("panel, scan-fine", scan, 80.0, (2.05, 6.5)),
+    ]
+    for name, shape, radius, pitches in discs:
+        for pitch in pitches:
+            pattern, region, _ = pack(shape, pitch)
+            (seconds,) = in_turn([partial(packing_seconds, shape, pitch)], repeats)
+            x, y = pattern.position[pattern.row == 0, :2].T
+            turn = np.sort(np.arctan2(y, x))
+            gap = np.diff(turn, append=turn[0] + 2 * np.pi) * (radius - pitch / 2) / pitch
+            edge = boundary_distance(pattern.position, region.boundary_segments).min() / pitch
+            room = 2 * np.pi * (radius - pitch / 2) / pitch
+            figures = [f"{room:.1f}", *(number(value, 2) for value in (gap.max(), gap.mean()))]
+            figures += [number(edge, 3), number(seconds, 3)]
+            print(f"| {name} | {pitch:g} | {len(pattern):,} | {len(x)} | {' | '.join(figures)} |", flush=True)
 
 
 def pack_once(name: str, pitch: float) -> None:

@@ -23,6 +23,10 @@ ISLAND = (20.0, 5.0, 15.0)
 """Centre and radius of the trapezoid's island."""
 
 
+JAGGED_RADIUS = 40.0
+"""Of the discs with a jagged boundary, whose faces are about one long."""
+
+
 @dataclass(frozen=True)
 class Shape:
     """A base geometry, the (T,) mask of its target region and a pitch that suits it."""
@@ -240,6 +244,32 @@ def mixed_sheet() -> Mesh:
     left = np.concatenate([[[-40.0, 30], [-40, -30]], np.column_stack([np.zeros(len(seam)), seam])])
     coarse = coarse_sheet([left])
     return closed_sheet(joined(fine, coarse))
+
+
+def pixel_disc(curved: bool, shift: float = 0.0, pitch: float = 6.0) -> Shape:
+    """A disc of the squares of a grid, flat or on a cap; its middle is off a corner of them by `shift`."""
+    grid = np.arange(-45.0, 46.0)
+    plane = grid_sheet(grid, grid, lambda u, v: np.stack([u, v, 0 * u], axis=1))
+    square = np.floor(plane.corners.mean(axis=1)[:, :2]) + 0.5
+    mesh = Mesh(_raised(plane.vertices[:, :2], curved), plane.triangles)
+    return Shape(mesh, np.linalg.norm(square + shift, axis=1) < JAGGED_RADIUS, pitch)
+
+
+def splinter_disc(curved: bool, seed: int = 0, pitch: float = 6.0) -> Shape:
+    """A disc of triangles between places at random, flat or on a cap."""
+    flat = np.random.default_rng(seed).uniform(-45, 45, (9000, 2))
+    triangles = Delaunay(flat).simplices.astype(np.int64)
+    clockwise = doubled_areas(flat, triangles) < 0
+    triangles[clockwise] = triangles[clockwise, ::-1]
+    middle = flat[triangles].mean(axis=1)
+    return Shape(
+        Mesh(_raised(flat, curved), triangles), np.linalg.norm(middle, axis=1) < JAGGED_RADIUS, pitch
+    )
+
+
+def _raised(flat: Floats, curved: bool) -> Floats:
+    """Places in plan on a plane or on a cap."""
+    return np.column_stack([flat, -curved * (flat**2).sum(axis=1) / 180])
 
 
 def joined(*meshes: Mesh) -> Mesh:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.spatial import Delaunay, cKDTree
+from scipy.spatial import cKDTree
 
 from bubble_pattern_addon.core.boundary import make_boundary, nearest_boundary
 from bubble_pattern_addon.core.mesh import Floats, Mesh
@@ -14,41 +14,14 @@ from bubble_pattern_addon.core.metric import Constant
 from bubble_pattern_addon.core.packing.pack import pack_steps
 from bubble_pattern_addon.core.progress import drive
 from bubble_pattern_addon.core.recipe import Packing
-from bubble_pattern_addon.core.region import Region, make_region
+from bubble_pattern_addon.core.region import make_region
 from bubble_pattern_addon.core.surface import positions
-from scripts.moulding import counter_clockwise
-from scripts.shapes import grid_sheet, tube_sheet
-
-RADIUS = 40.0
-"""Of the discs, whose faces are about one long."""
+from scripts.shapes import JAGGED_RADIUS, Shape, pixel_disc, splinter_disc, tube_sheet
 
 
-def raised(flat: Floats, curved: bool) -> Floats:
-    """Places in plan on a plane or on a cap."""
-    return np.column_stack([flat, -curved * (flat**2).sum(axis=1) / 180])
-
-
-def pixels(curved: bool, shift: float) -> Region:
-    """A disc of the squares of a grid."""
-    grid = np.arange(-45.0, 46.0)
-    plane = grid_sheet(grid, grid, lambda u, v: np.stack([u, v, 0 * u], axis=1))
-    middle = np.floor(plane.corners.mean(axis=1)[:, :2]) + 0.5
-    return make_region(
-        Mesh(raised(plane.vertices[:, :2], curved), plane.triangles),
-        np.linalg.norm(middle + shift, axis=1) < RADIUS,
-    )
-
-
-def splinters(curved: bool, seed: int) -> Region:
-    """A disc of triangles between places at random."""
-    flat = np.random.default_rng(seed).uniform(-45, 45, (9000, 2))
-    triangles = counter_clockwise(flat, Delaunay(flat).simplices.astype(np.int64))
-    middle = flat[triangles].mean(axis=1)
-    return make_region(Mesh(raised(flat, curved), triangles), np.linalg.norm(middle, axis=1) < RADIUS)
-
-
-def packed(region: Region, pitch: float) -> tuple[Floats, Floats, int]:
+def packed(shape: Shape, pitch: float) -> tuple[Floats, Floats, int]:
     """Places of the bubbles, their distances to the boundary in pitches, and the size of the first row."""
+    region = make_region(shape.mesh, shape.selected)
     ground, bubbles = drive(pack_steps(region, Packing(pitch=Constant(pitch))))
     points = positions(ground.charts, bubbles.spots)
     boundary = make_boundary(region, pitch / 8)
@@ -63,7 +36,7 @@ def check_round(points: Floats, away: Floats, first: int, pitch: float) -> None:
     assert away[:first].max() < 0.6
     assert np.abs(away[:first] - 0.5).mean() < 0.01
     angle = np.sort(np.arctan2(points[:first, 1], points[:first, 0]))
-    gap = np.diff(angle, append=angle[0] + 2 * np.pi) * (RADIUS - pitch / 2) / pitch
+    gap = np.diff(angle, append=angle[0] + 2 * np.pi) * (JAGGED_RADIUS - pitch / 2) / pitch
     # where the line turns between two long teeth a bubble stands, and the others keep clear of it
     assert gap.max() < 1.9
     assert abs(gap.mean() - 1) < 0.1
@@ -72,13 +45,13 @@ def check_round(points: Floats, away: Floats, first: int, pitch: float) -> None:
 @settings(max_examples=12, deadline=None)
 @given(curved=st.booleans(), shift=st.floats(0, 1), pitch=st.floats(3.5, 14))
 def test_the_first_row_goes_round_a_disc_of_squares(curved: bool, shift: float, pitch: float) -> None:
-    check_round(*packed(pixels(curved, shift), pitch), pitch)
+    check_round(*packed(pixel_disc(curved, shift), pitch), pitch)
 
 
 @settings(max_examples=12, deadline=None)
 @given(curved=st.booleans(), seed=st.integers(0, 1000), pitch=st.floats(5, 14))
 def test_the_first_row_goes_round_a_disc_of_splinters(curved: bool, seed: int, pitch: float) -> None:
-    check_round(*packed(splinters(curved, seed), pitch), pitch)
+    check_round(*packed(splinter_disc(curved, seed), pitch), pitch)
 
 
 @pytest.mark.parametrize("pitch", [2.4, 3.3, 6.0])
@@ -86,7 +59,7 @@ def test_the_first_row_goes_round_teeth(pitch: float) -> None:
     tube = tube_sheet(15, 80, 96, 80)
     # every square of the tube is two triangles, of which one is taken where the region ends
     along = tube.corners.mean(axis=1)[:, 2]
-    points, away, first = packed(make_region(tube, (along > 9.5) & (along < 69.5)), pitch)
+    points, away, first = packed(Shape(tube, (along > 9.5) & (along < 69.5), pitch), pitch)
     assert away.min() > 0.48
     for end in (points[:first, 2] < 40, points[:first, 2] > 40):
         assert end.sum() == pytest.approx(2 * np.pi * 15 / pitch, rel=0.06)
